@@ -61,6 +61,19 @@ def test_the_systematic_error_of_the_inputs_raises_the_bar():
     assert search(task, (BEND,), GATES).trials[0].why_not.code == "immaterial"
 
 
+def test_an_effect_smaller_than_what_the_instrument_resolves_is_none():
+    task = problem(3, truth=Wave(bend=0.2))
+    measured = np.concatenate([block.measured for block in task.role("identify")])
+    signal, (tried,) = float(np.sqrt(np.mean(measured**2))), search(task, (BEND,), GATES).trials
+    below, above = (
+        search(replace(task, unresolved=share * tried.evidence.size * signal), (BEND,), GATES)
+        for share in (1.1, 0.9)
+    )
+    assert below.names == ()
+    assert below.trials[0].why_not.code == "immaterial"
+    assert above.names == ("bend",)
+
+
 def test_an_effect_must_predict_conditions_left_out():
     outcome = search(problem(4, truth=Wave(bend=0.2)), (BEND,), replace(GATES, held_out_gain=1e9))
     assert outcome.names == ()

@@ -71,6 +71,10 @@ def test_impacts_elsewhere_or_none_leave_the_damping_in_doubt() -> None:
         found, _ = told(mass(1.0), table)
         assert isinstance(found, TipDynamics)
         assert found.damping is None
+        (at_once,) = found.beside  # how much of the compliance belongs to other modes is not known either
+        assert np.isinf(at_once.frequency)
+        assert np.square(at_once.reach) == pytest.approx(SOFT[2, 2], rel=1e-6)
+    assert told(mass(1.0), modes("A"))[0].beside == ()
 
 
 def test_one_mode_shows_the_damping_at_its_frequency() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -33,13 +34,22 @@ class BelievedSetting:
     """What is believed beforehand of a face's base parameters: evidence on these alone."""
 
 
-def parameters(*, placed: bool, beside: Sequence[Beside], ringing: Sequence[str]) -> tuple[Parameter, ...]:
+@lru_cache(maxsize=16)
+def parameters(
+    *, placed: bool, beside: tuple[Beside, ...], ringing: tuple[str, ...]
+) -> tuple[Parameter, ...]:
     """Return parameters of scanner, force, other modes and, by pose, of the tip's damping and frequencies."""
     place = [Parameter(name, "um", UM) for name in (*(PLACE if placed else ()), *FORM)]
     swings = [one for each in beside for one in each.parameters]
     lossy = [Parameter(f"{LOSS}{pose}", "%", 0.01) for pose in ringing]
     tuned = [Parameter(f"{TUNED}{pose}", "%", 0.01) for pose in ringing]
     return (*place, Parameter(FORCE, "%", 0.01), *swings, *lossy, *tuned)
+
+
+@lru_cache(maxsize=16)
+def places(believed: tuple[Parameter, ...]) -> dict[str, int]:
+    """Return the place of each parameter by its name; it is kept, since a fit asks for it all the time."""
+    return {one.name: place for place, one in enumerate(believed)}
 
 
 def believed_block(believed: Sequence[Parameter], beside: Sequence[Beside], held: float) -> Block:

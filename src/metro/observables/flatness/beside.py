@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,7 +31,7 @@ class Beside:
     pose: str
     modes: tuple[ArmMode, ...]
 
-    @property
+    @cached_property
     def believed(self) -> tuple[tuple[Parameter, float, float], ...]:
         """Parameters with their values and standard deviations before a face is looked at.
 
@@ -51,7 +51,7 @@ class Beside:
                     said.append((one, 1.0, REACH_SD) if axis == "z" else (one, 0.0, SIGN_SD))
         return tuple(said)
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """The parameters alone."""
         return tuple(one for one, _, _ in self.believed)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from metro.observables.flatness.beliefs import FORCE, LOSS, BelievedSetting, parameters
+from metro.observables.flatness.beliefs import FORCE, LOSS, BelievedSetting, parameters, places
 from metro.observables.flatness.beside import Beside
 from metro.observables.flatness.beside import swung as swung_beside
 from metro.observables.flatness.path import Pace, Passages
@@ -22,7 +22,7 @@ from metro.observables.flatness.pose_field import (
 from metro.observables.flatness.ringing import Ringing
 from metro.observables.flatness.rung import lossier, rung, sharper
 from metro.observables.flatness.setup import Setup, swung
-from metro.observables.flatness.tip import static, terms, tip
+from metro.observables.flatness.tip import Known, static, terms, tip
 from metro.observables.problem import Block, Parameter
 from metro.observables.waviness.model import Vibration, phase_starts, phases_of
 from metro.structure import Structure
@@ -217,7 +217,7 @@ class FlatnessModel:
 
     def _tip(self, setting: FaceSetting, beta: Array) -> Array:
         """Return the height of the tip at each passage by ``beta``, (n, k) m, as stiff as in load tests."""
-        believed, first = [one.name for one in self.believed], len(self.believed)
+        place, first = places(self.believed), len(self.believed)
         for part in self.fields:
             count = int(part.used.sum())
             if part.pose == setting.pose:
@@ -225,21 +225,24 @@ class FlatnessModel:
                 coefficients[part.used] = beta[first : first + count]
             first += count
         harder, loss = self._rings(setting, beta)
-        ringing = self.tuning(self._off(setting, beta)), loss
-        height = tip(self._basis(setting), setting, tuple(coefficients.tolist()), harder, ringing)
-        for each in self._beside(setting):
-            place = [believed.index(one.name) for one in each.parameters]
-            height = height + swung_beside(each.modes, setting) @ beta[place]
-        return height
+        known = Known(
+            coefficients=tuple(coefficients.tolist()),
+            harder=harder,
+            tuning=self.tuning(self._off(setting, beta)),
+            loss=loss,
+            beside=tuple(
+                (each.modes, tuple(float(beta[place[one.name]]) for one in each.parameters))
+                for each in self._beside(setting)
+            ),
+        )
+        return tip(self._basis(setting), setting, known)
 
     def _rings(self, setting: FaceSetting, beta: Array | None) -> tuple[float, float]:
         """Return by how much the force is larger, relative, and the damping ratio higher, than is known."""
-        known = (
-            {}
-            if beta is None
-            else dict(zip((one.name for one in self.believed), beta.tolist(), strict=False))
-        )
-        return known.get(FORCE, 0.0), known.get(f"{LOSS}{setting.pose}", 0.0)
+        if beta is None:
+            return 0.0, 0.0
+        place, loss = places(self.believed), f"{LOSS}{setting.pose}"
+        return float(beta[place[FORCE]]), float(beta[place[loss]]) if loss in place else 0.0
 
     def _beside(self, setting: FaceSetting) -> list[Beside]:
         """Return the modes that swing beside those of the tip in a face, if there are any."""

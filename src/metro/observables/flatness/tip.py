@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from metro.observables.flatness.beside import swung
+from metro.observables.flatness.dynamics import ArmMode
 from metro.observables.flatness.rung import lossier, rung
 from metro.surface.tip_stiffness import Basis, heights_design
 from metro.units import Array
@@ -30,24 +33,32 @@ def static(basis: Basis, setting: FaceSetting) -> Array:
     return np.asarray((rows @ setting.loaded).reshape(at.x.T.shape).T)
 
 
-# The derivatives by what is not of the tip are all taken at the same coefficients.
-@lru_cache(maxsize=64)
-def tip(
-    basis: Basis,
-    setting: FaceSetting,
-    coefficients: tuple[float, ...],
-    harder: float,
-    ringing: tuple[float, float],
-) -> Array:
-    """Return the height of the tip at each passage, (n, k) m, of one as stiff as in the load tests.
+@dataclass(frozen=True)
+class Known:
+    """What a fit says of the tip at a pose.
 
-    Parameters
+    Attributes
     ----------
     coefficients : (3 · terms,) of the compliance, m/N. harder : relative rise of the force, of which the
-        compliance of the load tests says what it makes. ringing : tuning, and damping ratio over the known
-        one.
+        compliance of the load tests says what it makes. tuning : of the frequencies. loss : damping ratio
+        over the known one. beside : other modes that swing, and the parameters of each
+        (:class:`metro.observables.flatness.beside.Beside`).
     """
-    tuning, loss = ringing
-    height = terms(basis, setting) @ (setting.force @ np.reshape(coefficients, (3, -1)))
-    height = height + harder * (static(basis, setting) + rung(setting, tuning))
-    return np.asarray(height + loss * lossier(setting, tuning))
+
+    coefficients: tuple[float, ...]
+    harder: float
+    tuning: float
+    loss: float
+    beside: tuple[tuple[tuple[ArmMode, ...], tuple[float, ...]], ...]
+
+
+# The derivatives by what is not of the tip are all taken where it is known to be the same.
+@lru_cache(maxsize=64)
+def tip(basis: Basis, setting: FaceSetting, known: Known) -> Array:
+    """Return the height of the tip at each passage, (n, k) m, of one as stiff as in the load tests."""
+    height = terms(basis, setting) @ (setting.force @ np.reshape(known.coefficients, (3, -1)))
+    height = height + known.harder * (static(basis, setting) + rung(setting, known.tuning))
+    height = height + known.loss * lossier(setting, known.tuning)
+    for modes, reach in known.beside:
+        height = height + swung(modes, setting) @ np.array(reach)
+    return np.asarray(height)
