@@ -214,6 +214,7 @@ def test_an_effect_that_helps_one_condition_alone_is_not_added():
         statistic=50.0,
         p_value=1e-6,
         held_out={"a": 9.0, "b": -1.0, "c": -1.0, "d": -1.0},
+        moved=0.1,
         size=0.1,
         missed=0.0,
     )
@@ -224,14 +225,14 @@ def test_an_effect_that_helps_one_condition_alone_is_not_added():
 
 
 def test_an_effect_smaller_than_half_of_what_stays_unexplained_is_added_on_trial_only():
-    evidence = Evidence(statistic=50.0, p_value=1e-6, held_out={}, size=0.02, missed=0.05)
+    evidence = Evidence(statistic=50.0, p_value=1e-6, held_out={}, moved=0.02, size=0.02, missed=0.05)
     assert trial_room._why_not(evidence, 0.0, GATES, 0.004) is None
     assert "5 % of the signal remain unexplained" in in_words(trial_room.small_beside_residual(evidence))
     assert trial_room.small_beside_residual(replace(evidence, missed=0.03)) is None
 
 
 def test_a_small_p_value_among_many_candidates_is_told_with_what_it_is_among_so_many():
-    evidence = Evidence(statistic=9.0, p_value=0.006, held_out={}, size=0.02, missed=0.0)
+    evidence = Evidence(statistic=9.0, p_value=0.006, held_out={}, moved=0.02, size=0.02, missed=0.0)
     assert "(q = 0.06 over" in in_words(trial_room._why_not(evidence, 0.06, GATES, 0.004))
     weak = in_words(trial_room._why_not(replace(evidence, p_value=0.4), 0.9, GATES, 0.004))
     assert weak == "not significant: p = 0.4 over the identification runs"
@@ -279,7 +280,7 @@ def test_runs_that_hold_their_wave_once_say_nothing_of_changes_along_the_run():
 )
 def test_conditions_that_an_effect_does_not_touch_say_nothing_of_it(gains, share):
     held_out = {f"condition {i}": gain for i, gain in enumerate(gains)}
-    evidence = Evidence(1.0, 0.5, held_out, 0.1, 0.0)
+    evidence = Evidence(1.0, 0.5, held_out, 0.1, 0.1, 0.0)
     assert evidence.better_share == pytest.approx(share)
 
 

@@ -57,7 +57,7 @@ def test_what_is_significant_stays_and_what_is_not_goes(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("size", "missed", "budget", "stays"),
+    ("moved", "missed", "budget", "stays"),
     [
         (0.05, 0.022, 0.007, True),  # √(2.2² + 0.7²) % = 2.3 %: twice that is 4.6 %
         (0.045, 0.022, 0.007, False),
@@ -67,8 +67,9 @@ def test_what_is_significant_stays_and_what_is_not_goes(monkeypatch):
         (0.11, 0.12, 0.007, False),
     ],
 )
-def test_an_effect_stays_that_all_that_is_missed_could_not_make(size, missed, budget, stays):
-    evidence = Evidence(0.0, 0.0, {}, size, missed)
+def test_an_effect_stays_that_all_that_is_missed_could_not_make(moved, missed, budget, stays):
+    """By what it moves: what it spares the base parameters moves no prediction."""
+    evidence = Evidence(0.0, 0.0, {}, moved, 0.5, missed)
     assert forward._exceeds_all_missed(evidence, budget) == stays
 
 

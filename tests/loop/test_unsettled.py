@@ -242,7 +242,7 @@ def test_what_leaves_no_prediction_where_a_condition_is_left_out_is_no_rival(mon
 def test_what_gains_nothing_is_not_significant_whether_or_not_it_converged():
     found = fitted(problem(1, truth=Wave(bend=0.1), phased=False), BEND)
     astray = replace(found, step=5.0)
-    none = trial.Evidence(0.5, 0.6, {}, 0.1, 0.0)
+    none = trial.Evidence(0.5, 0.6, {}, 0.1, 0.1, 0.0)
     one = trial.Trial(BEND, astray, none, q_value=0.6)
     assert trial._refused(one, GATES, GATES.materiality).code == "no_evidence"
     gains = replace(one, evidence=replace(none, statistic=80.0, p_value=1e-9), q_value=1e-9)

@@ -133,7 +133,7 @@ def _tested(cause: Cause, gates: Gates) -> Judged | None:
         for witness in heard.witnesses
         for name, gain in witness.evidence.held_out.items()
     }
-    pooled = Evidence(cause.statistic, cause.p_value, gains, 0.0, 0.0)
+    pooled = Evidence(cause.statistic, cause.p_value, gains, 0.0, 0.0, 0.0)
     enough = pooled.gain >= gates.held_out_gain and pooled.better_share >= LEAST_BETTER
     if (
         not enough

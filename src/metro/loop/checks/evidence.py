@@ -40,14 +40,17 @@ class Evidence:
     statistic : twice the gain in log-likelihood. p_value : of it, by F with run-level degrees of freedom.
     held_out : gain in log-likelihood of each condition when it is left out of both fits; empty where that was
         not worth computing.
-    size : rms change of the prediction over the rms of the signal. missed : rms of what the larger candidate
-        misses beyond the noise, over that of the signal.
+    moved : rms change of the prediction over the rms of the signal.
+    size : the same, with what the base parameters are spared of straying from what is believed of them
+        (:func:`relieved`).
+    missed : rms of what the larger candidate misses beyond the noise, over that of the signal.
     sought : number of places among which the additional effects were sought, on all runs.
     """
 
     statistic: float
     p_value: float
     held_out: dict[str, float]
+    moved: float
     size: float
     missed: float
     sought: float = 1.0
@@ -75,8 +78,9 @@ def compare(smaller: Fit, larger: Fit) -> Evidence:
     parameters = len(larger.theta) - len(smaller.theta) + runs * (_own(larger) - _own(smaller))
     sought = _sought(larger) / _sought(smaller)
     p_value = -math.expm1(sought * math.log1p(-min(tail(statistic, parameters, runs), 1.0 - 1e-16)))
-    size = math.hypot(change(smaller, larger), relieved(smaller, larger))
-    return Evidence(statistic, p_value, {}, size, missed(larger), sought)
+    moved = change(smaller, larger)
+    size = math.hypot(moved, relieved(smaller, larger))
+    return Evidence(statistic, p_value, {}, moved, size, missed(larger), sought)
 
 
 def hold_out(evidence: Evidence, smaller_out: Mapping[str, float], larger: Fit, prior: Noise) -> Evidence:

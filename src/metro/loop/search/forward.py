@@ -151,10 +151,11 @@ def _exceeds_all_missed(evidence: Evidence, budget: float) -> bool:
 
     What is missed, of a share m of the signal, and the ``budget`` b of what no model gets right, have at most
     an effect of the size √(m² + b²), where they have its shape and nothing else; spread over other shapes,
-    they have less. An effect that moves the prediction by much need only exceed what is missed.
+    they have less. An effect that moves the prediction by much need only exceed what is missed. What it
+    spares the base parameters moves nothing, and does not count.
     """
     largest = math.hypot(evidence.missed, budget)
-    return evidence.size > min(WORST * largest, max(MUCH, evidence.missed))
+    return evidence.moved > min(WORST * largest, max(MUCH, evidence.missed))
 
 
 def _open(current: Fit, barred: set[str], space: SearchSpace) -> list[Effect]:
