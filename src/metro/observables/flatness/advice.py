@@ -14,8 +14,8 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.observables.cut import conditions as cutting_force
+from metro.observables.flatness.beliefs import FORM
 from metro.observables.flatness.blocks import Pose, face_block
-from metro.observables.flatness.model import FORM
 from metro.observables.flatness.path import beside, disc_along, work_size
 from metro.observables.flatness.placing import plane_directions
 from metro.observables.flatness.scan import POINT_COLUMNS

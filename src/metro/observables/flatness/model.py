@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 
 ENTRIES = ("zx", "zy", "zz")
 FARTHEST = 0.7  # of what the tip's frequencies are off, as a logarithm: half or twice as high
-FORM = ("form_xx", "form_xy", "form_yy")  # of the scanner: curvatures, as the height at the edges of the work
 # Places across and along the feed, in radii of a disc, whose mean equals that over the disc: exactly for a
 # cubic, and to 0.2 % for a wave of three radii or more.
 ACROSS, AHEAD = np.sqrt(0.5) * np.array([[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0]])
@@ -82,6 +81,14 @@ class FaceSetting:
         """The passages, with the axis' position along the pass for the middle of each disc."""
         ahead = np.tile(self.disc * AHEAD, len(self.x) // len(AHEAD))
         return replace(self.passages, along=self.passages.along - ahead[:, None])
+
+    def weights_of(self, share: Array) -> csr_array:
+        """Weight of each passage in each bin, (bins, 4 n k), by its ``share`` of a place: few have any."""
+        from scipy.sparse import csr_array
+
+        at = np.flatnonzero(share)
+        begins = np.searchsorted(at, share.shape[1] * np.arange(len(share) + 1))
+        return self._weights @ csr_array((share.ravel()[at], at, begins), shape=(len(share), share.size))
 
     def mean(self, values: Array) -> Array:
         """Average the values of places, (4 n,) or (4 n, p), over the discs, and these over the bins."""
@@ -328,15 +335,14 @@ def _shaped(
     beta = None if known is None else np.array(known)
     share, lowest = model.finished(setting, np.array(phases), beta)
     basis, tuning = model._basis(setting), model.tuning(model._off(setting, beta))
-    shared = np.einsum("nk,nkt->nt", share, terms(basis, setting))
     harder = static(basis, setting) + rung(setting, tuning)
     share_of_force, loss = model._rings(setting, beta)
     rising = sharper(setting, tuning, harder=share_of_force, loss=loss)
     gained = harder, rising, lossier(setting, tuning)
-    heights = [model._deflected(setting, beta), *(model.structure.in_cut(one) for one in gained)]
-    of_tip, *gains = [np.einsum("nk,nk->n", share, one) for one in heights]
-    means = setting.mean(np.stack([lowest - of_tip, *gains], axis=1))
     others = [swung_beside(each.modes, setting) for each in model._beside(setting)]
     swings = np.concatenate([*others, np.zeros((*share.shape, 0))], axis=-1)
-    swings = model.structure.in_cut(setting.mean(np.einsum("nk,nkt->nt", share, swings)))
-    return setting.mean(shared), means[:, 0], means[:, 1:], swings
+    heights = np.stack([model._deflected(setting, beta), *map(model.structure.in_cut, gained)], axis=-1)
+    weights = setting.weights_of(share)
+    parts = terms(basis, setting), heights, model.structure.in_cut(swings)
+    shared, means, given = (weights @ part.reshape(share.size, -1) for part in parts)
+    return shared, setting.mean(lowest) - means[:, 0], means[:, 1:], given
