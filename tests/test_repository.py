@@ -33,7 +33,7 @@ ROOMS = {
     "cutting": {"signals", "compiled"},
     "dynamics": {"signals", "cutting", "compiled"},
     "robot": {"signals"},
-    "surface": {"signals"},
+    "surface": {"signals", "compiled"},
     "observables": {"batch", "signals", "structure", "kriging", *PHYSICS},
     "effects": {"signals", "structure", "observables", *PHYSICS},
     "slips": {"batch", "signals", "cutting", "observables"},

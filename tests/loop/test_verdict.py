@@ -212,7 +212,7 @@ def test_what_errors_of_the_inputs_may_look_like_is_named_as_a_trace_and_not_cla
     (size,) = [trial.evidence.size for trial in outcome.trials if trial.effect.name == "bend"]
     assert verdict["traces"] == (
         f"Bend ({100 * size:.2g} % of the signal) improves the fit significantly, but errors of the model's "
-        "inputs may cause up to 60 %, so it is not claimed."
+        "inputs or of the instrument may cause up to 60 %, so it is not claimed."
     )
     assert verdict_words("force", verdict).count(verdict["traces"]) == 1
     assert "no larger effect is missing" in verdict_words("force", verdict)
@@ -224,7 +224,7 @@ def test_several_traces_are_named_the_largest_first():
     seen = [{"effect": name, "size": size, "least": 0.04} for name, size in (("bend", 0.01), ("big", 0.03))]
     assert in_words(Statement("traces", {"seen": seen})) == (
         "Big (3 % of the signal) and bend (1 % of the signal) each improve the fit significantly, but errors "
-        "of the model's inputs may cause up to 4 %, so none of them is claimed."
+        "of the model's inputs or of the instrument may cause up to 4 %, so none of them is claimed."
     )
 
 
