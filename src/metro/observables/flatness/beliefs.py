@@ -20,7 +20,7 @@ FORM = ("form_xx", "form_xy", "form_yy")  # of the scanner: curvatures, as the h
 
 # Friction h against a motion of amplitude F/k loses 4 h F/k per cycle, as a damping ratio of 2 h / (π F) does
 # (2 π ζ F²/k); and before it slips it is a spring, which makes the tip stiffer by up to h / F.
-LOSS_OF_FRICTION, STIFFNESS_OF_FRICTION = 2.0 / math.pi, 1.0
+LOSS_OF_FRICTION = 2.0 / math.pi
 LEAST_LOSS = 0.001  # as a damping ratio: blows tell it no better
 # Of the tip's frequencies: the reduced mass is declared, and known to some 5 % (drawings, or a hammer).
 FREQUENCY_SD = 0.025
@@ -63,7 +63,7 @@ def believed_block(believed: Sequence[Parameter], beside: Sequence[Beside], held
     swings = [said for each in beside for said in each.believed]
     known |= {one.name: sd for one, _, sd in swings}
     values = {one.name: value for one, value, _ in swings}
-    tuned = math.hypot(FREQUENCY_SD, 0.5 * STIFFNESS_OF_FRICTION * held)
+    tuned = math.hypot(FREQUENCY_SD, 0.5 * held)
     loss = math.hypot(LEAST_LOSS, LOSS_OF_FRICTION * held)
     known |= {one.name: loss for one in believed if one.name.startswith(LOSS)}
     sigma = np.array([known.get(one.name, tuned) for one in believed])

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from metro.observables.flatness.ringing import Ringing
 
 FINE = 0.002  # relative change of the frequencies by which the slope of the ringing is taken
-LOSSIER = 0.05  # damping ratio by which the slope of the ringing is taken: what arms have once more
+LOSSIER = 0.05  # higher damping ratio to which the slope of the ringing is taken: as much as arms have
 NODES = 0.01  # spacing of nodes in the logarithm of the tuning, between which ringing is interpolated
 
 
