@@ -16,10 +16,11 @@ from metro.loop.fitting import noise
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.fit import fit, score
 from metro.loop.fitting.noise import first_noise
+from metro.loop.fitting.system import moved_models, sensitivities
 from metro.loop.search.search import search
 from metro.loop.verdict.verdict import parameters
 from metro.observables.flatness.model import _shaped
-from metro.observables.flatness.setup import Setup
+from metro.observables.flatness.setup import Setup, bow_shapes
 from metro.observables.problem import predictions
 
 
@@ -214,6 +215,36 @@ def test_what_is_outside_the_library_is_most_like_a_cause_of_its_kind(made, name
     assert likeness > max(total.values()) + likelier
 
 
+def test_derivatives_by_effects_and_phases_are_those_of_the_predictions(clean):
+    task, base, _ = clean
+    names = ("path_vibration", "stiffness_scale", "fixture_bow", "entry_transient", "spindle_tilt")
+    effects = tuple(effect_of(task, name) for name in names)
+    values = [1.7, 8.0, 0.8, 40.0, -25.0, 30.0, 40.0, 15.0, 0.9, -0.6]
+    theta = np.array([*values[:8], *([-20.0] if len(effects[3].parameters) == 3 else []), *values[8:]])
+    candidate = Candidate(task.base, effects)
+    moved = moved_models(candidate, theta)
+    model, size = candidate.model(theta), [parameter.scale for parameter in candidate.parameters]
+    for block in (*task.role("identify")[:2], *task.role("calibrate")[:1]):
+        nuisance = model.nuisance_starts(block)[-1]
+        effect, own = sensitivities(model, moved, block, nuisance, base.beta)
+
+        def slope(i, block=block, nuisance=nuisance):
+            there = [theta + step * size[i] * np.eye(len(theta))[i] for step in (1e-3, -1e-3)]
+            ends = [predictions(candidate.model(at), block, nuisance[None], base.beta)[0] for at in there]
+            return (ends[0] - ends[1]) / (2e-3 * size[i])
+
+        expected = np.array([slope(i) for i in range(len(theta))]).T
+        largest = np.abs(expected).max(axis=0)
+        # A place where two passages are nearly as low bends, which a difference of a finite step sees.
+        assert (np.abs(effect - expected).max(axis=0) <= 0.02 * largest).all()
+        steps = nuisance + 1e-3 * np.repeat([[1.0], [-1.0]], len(nuisance), axis=1)
+        ends = predictions(model, block, steps, base.beta)
+        np.testing.assert_allclose(
+            own.sum(axis=1), (ends[0] - ends[1]) / 2e-3, atol=0.02 * np.abs(own).max(initial=0.0)
+        )
+        assert block.role == "calibrate" or (largest > 0.0).all()
+
+
 @pytest.mark.parametrize("placed", [True, False])
 def test_a_prediction_at_many_phases_is_that_of_the_design_at_each(placed):
     task = problem(placed=placed)
@@ -237,7 +268,7 @@ def test_a_bow_is_over_all_passages_alike_and_no_face_is_finished_anew_for_it():
     bent = Candidate(task.base, (effect,)).model(np.array([40.0, -25.0, 30.0]))
     height = bent.design(block, np.zeros(1))[1] - task.base.design(block, np.zeros(1))[1]
     setting = block.setting
-    bow = setting.mean(bent.setup.bowed(setting.x, setting.y, setting.size))
+    bow = setting.mean(bow_shapes(setting.x, setting.y, setting.size) @ bent.setup.bowed)
     np.testing.assert_allclose(height, setting.shape(bow), atol=1e-12)
     assert np.ptp(height) > 20e-6
     assert _shaped.cache_info().misses == finished
@@ -246,7 +277,7 @@ def test_a_bow_is_over_all_passages_alike_and_no_face_is_finished_anew_for_it():
 def test_a_form_of_third_degree_is_what_its_parameters_say():
     x, y = np.random.default_rng(2).uniform(0.0, 1.0, (2, 50)) * [[0.12], [0.06]]
     u, v = 2.0 * x / 0.12 - 1.0, 2.0 * y / 0.06 - 1.0
-    height = Setup(cubic=(1e-5, 2e-5, 3e-5, 4e-5)).bowed(x, y, (0.12, 0.06))
+    height = bow_shapes(x, y, (0.12, 0.06)) @ Setup(cubic=(1e-5, 2e-5, 3e-5, 4e-5)).bowed
     np.testing.assert_allclose(
         height, 1e-5 * u**3 + 2e-5 * u**2 * v + 3e-5 * u * v**2 + 4e-5 * v**3, atol=1e-15
     )

@@ -12,7 +12,8 @@ from metro.observables.cut import conditions as cutting_force
 from metro.observables.flatness.beside import AT_ONCE_SD, REACH_SD, SIGN_SD, Beside
 from metro.observables.flatness.doubt import damping_doubt
 from metro.observables.flatness.dynamics import ArmMode, TipDynamics
-from metro.observables.flatness.model import FaceSetting, FlatnessModel
+from metro.observables.flatness.face_setting import FaceSetting
+from metro.observables.flatness.model import FlatnessModel
 from metro.observables.flatness.path import Pace, force_over_period, make_path, passages
 from metro.observables.flatness.pose_field import PoseField
 from metro.observables.flatness.ringing import Ringing, make_ringing

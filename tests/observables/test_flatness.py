@@ -21,7 +21,7 @@ from metro.loop.search.search import search
 from metro.loop.search.trial import Gates
 from metro.observables.cut import conditions as cutting_force
 from metro.observables.flatness import observable as flatness
-from metro.observables.flatness.model import FaceSetting
+from metro.observables.flatness.face_setting import FaceSetting
 from metro.observables.flatness.path import force_over_period, make_path, passages
 from metro.observables.flatness.pose_field import LoadSetting
 from metro.observables.problem import BaseFit, Block, Problem, Refusal

@@ -7,7 +7,7 @@ import pytest
 from metro.observables.arm.tip_force import SYSTEMATIC
 from metro.observables.cut.upstream import OFF, mean_forces, with_forces
 from metro.observables.deformation.model import CutWall
-from metro.observables.flatness.model import FaceSetting
+from metro.observables.flatness.face_setting import FaceSetting
 from metro.observables.problem import Block
 
 FORCES = {name: np.array([10.0, 20.0, 30.0]) * share for name, share in (("measured", 1.0), ("before", 1.2))}

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from metro.compiled import compiled_with_arrays
 from metro.units import Array
 
 
@@ -59,40 +60,59 @@ def respond(modes: TipModes, ratio: Array, force: Array, step: float) -> Array:
     """
     ratio = np.broadcast_to(ratio, modes.frequency.shape)
     once = _transition(modes.frequency, ratio, step)
-    own = _from_rest(modes.frequency, ratio, once, (force @ modes.shape).swapaxes(0, 1), step)
-    free = _powers(once, force.shape[1] - 1)
-    begin = _begins(modes, own[-1], free[-1])
-    modal = own[:-1, 0] + free[:-1, 0, 0] * begin[0] + free[:-1, 0, 1] * begin[1]
-    return np.asarray((modal * modes.shape[:, 2]).sum(axis=2).T)
+    across = modes.inverse[1:] @ modes.shape[:-1]  # from the modes of a segment to those of the next
+    modal = _carried(_followed(modes.frequency, ratio, step), once, across, force @ modes.shape)
+    return np.asarray((modal * modes.shape[:, None, 2]).sum(axis=2))
 
 
 def swing(frequency: float, ratio: float, force: Array, step: float) -> Array:
-    """Return the motion (n, k) under forces (n, k), linear between samples, of an oscillator at rest.
+    """Return the motion of an oscillator at rest under forces (n + 1, k), linear between samples: (n, k).
 
-    It is in the unit of the force: the static motion is the force itself. ``frequency`` in rad/s.
+    It is that at all but the last sample, in the unit of the force: the static motion is the force itself.
+    ``frequency`` in rad/s.
     """
     every = np.full((1, force.shape[1]), frequency)
     share = np.full_like(every, ratio)
-    once = _transition(every, share, step)
-    return np.asarray(_from_rest(every, share, once, frequency**2 * force[:, None], step)[:, 0, 0])
+    once, alone = _transition(every, share, step), np.zeros((0, *2 * every.shape[1:]))
+    return np.asarray(_carried(_followed(every, share, step), once, alone, frequency**2 * force[None])[0])
 
 
-def _from_rest(frequency: Array, ratio: Array, once: Array, push: Array, step: float) -> Array:
-    """Modal place and speed (m + 1, 2, s, 3) in each segment, were it entered at rest in the origin.
-
-    Of a push (m + 1, s, 3) that grows by r per second, q = p/ω² − 2 ζ r/ω³ is a motion; what it lacks of the
-    true one goes as a free motion, ``once`` from sample to sample.
-    """
+def _followed(frequency: Array, ratio: Array, step: float) -> Array:
+    """Return a, b, c (3, s, k): a push p that rises by r a step is followed by a p − b r at a speed c r."""
     square = frequency**2
-    speed = np.diff(push, axis=0) / (step * square)
-    late = 2 * ratio / frequency * speed
-    start, end = (np.stack([at / square - late, speed], axis=1) for at in (push[:-1], push[1:]))
-    added = end - once[:, 0] * start[:, :1] - once[:, 1] * start[:, 1:]
-    state = np.zeros((len(push), *start.shape[1:]))
-    for number, gained in enumerate(added):
-        before = state[number]
-        state[number + 1] = once[:, 0] * before[0] + once[:, 1] * before[1] + gained
-    return state
+    return np.array([1.0 / square, 2.0 * ratio / (frequency * square * step), 1.0 / (square * step)])
+
+
+@compiled_with_arrays
+def _carried(follows: Array, once: Array, across: Array, push: Array) -> Array:
+    """Modal places (s, m, k) at the samples of each segment but the last, from rest at the first one.
+
+    What a motion that follows the push lacks of the true one goes as a free motion. From a segment to the
+    next it is the tip that moves on, and not its modes.
+
+    Parameters
+    ----------
+    follows : (3, s, k) of :func:`_followed`. once : (2, 2, s, k) map of place and speed over a step.
+    across : (s − 1, k, k) from the modes of each segment to those of the next.
+    push : (s, m + 1, k) modal force.
+    """
+    segments, samples, count = push.shape
+    place = np.empty((segments, samples - 1, count))
+    at, speed = np.zeros(count), np.zeros(count)
+    for s in range(segments):
+        if s:
+            at, speed = across[s - 1] @ at, across[s - 1] @ speed
+        for i in range(count):
+            static, late, quick = follows[0, s, i], follows[1, s, i], follows[2, s, i]
+            for m in range(samples - 1):
+                place[s, m, i] = at[i]
+                risen = push[s, m + 1, i] - push[s, m, i]
+                left = at[i] - static * push[s, m, i] + late * risen
+                faster = speed[i] - quick * risen
+                at[i] = once[0, 0, s, i] * left + once[0, 1, s, i] * faster
+                speed[i] = once[1, 0, s, i] * left + once[1, 1, s, i] * faster + quick * risen
+                at[i] += static * push[s, m + 1, i] - late * risen
+    return place
 
 
 def _transition(frequency: Array, ratio: Array, time: float) -> Array:
@@ -106,30 +126,6 @@ def _transition(frequency: Array, ratio: Array, time: float) -> Array:
     return np.array(
         [[cosine + decay * sine, sine], [-(frequency**2) * sine, cosine - decay * sine]], dtype=np.float64
     )
-
-
-def _powers(once: Array, most: int) -> Array:
-    """Return the maps over 0, 1, … ``most`` steps, (most + 1, 2, 2, s, 3)."""
-    powers = np.empty((most + 1, *once.shape))
-    powers[0] = np.eye(2)[:, :, None, None]
-    for number in range(most):
-        before = powers[number]
-        powers[number + 1] = once[:, :1] * before[:1] + once[:, 1:] * before[1:]
-    return powers
-
-
-def _begins(modes: TipModes, own: Array, free: Array) -> Array:
-    """Modal place and speed (2, s, 3) at the start of each segment; what moves on is the tip, not the mode.
-
-    ``own`` (2, s, 3): state at the end of a segment entered at rest; ``free`` (2, 2, s, 3): map over it.
-    """
-    across = modes.inverse[1:] @ modes.shape[:-1]  # from the modes of a segment to those of the next
-    change = np.einsum("sij,xysj->sxiyj", across, free[:, :, :-1]).reshape(-1, 6, 6)
-    added = np.einsum("sij,xsj->sxi", across, own[:, :-1]).reshape(-1, 6)
-    begin = np.zeros((len(modes.shape), 6))
-    for number, (turn, push) in enumerate(zip(change, added, strict=True)):
-        begin[number + 1] = turn @ begin[number] + push
-    return np.asarray(begin.reshape(-1, 2, 3).swapaxes(0, 1))
 
 
 def disc_weights(radius: float, step: float) -> Array:

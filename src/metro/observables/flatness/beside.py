@@ -5,17 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from metro.observables.flatness.dynamics import ArmMode
+from metro.observables.flatness.face_setting import FaceSetting
+from metro.observables.flatness.ringing import Ringing
 from metro.observables.problem import Parameter
 from metro.units import Array
-
-if TYPE_CHECKING:
-    from metro.observables.flatness.model import FaceSetting
-    from metro.observables.flatness.ringing import Ringing
 
 # Of a mode beside those of M and K: its sign across z is not known; its reach is that where it was struck.
 SIGN_SD, REACH_SD = 1.0, 0.2
@@ -63,12 +60,12 @@ def swung(modes: tuple[ArmMode, ...], setting: FaceSetting) -> Array:
     ringing = setting.ringing
     assert ringing is not None
     heights = [
-        ringing.at(swing, setting.middle)
+        ringing.at(swing, setting.middle).T
         for mode in modes
         for swing, reach in zip(_swings(ringing, mode), mode.reach, strict=True)
         if reach
     ]
-    return np.stack(heights, axis=-1)
+    return np.stack(heights).T
 
 
 @lru_cache(maxsize=256)

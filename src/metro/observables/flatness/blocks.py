@@ -13,7 +13,7 @@ from metro.batch.batch import Batch
 from metro.observables.cut import conditions as cutting_force
 from metro.observables.flatness.doubt import damping_doubt
 from metro.observables.flatness.dynamics import TipDynamics, tip_dynamics
-from metro.observables.flatness.model import ACROSS, AHEAD, FaceSetting
+from metro.observables.flatness.face_setting import ACROSS, AHEAD, FaceSetting
 from metro.observables.flatness.noise import LAG, bin_sigma
 from metro.observables.flatness.path import (
     NARROW,

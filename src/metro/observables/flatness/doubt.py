@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from metro.observables.flatness.model import FaceSetting, FlatnessModel
+from metro.observables.flatness.face_setting import FaceSetting
+from metro.observables.flatness.model import FlatnessModel
 from metro.observables.flatness.pose_field import PoseField
 from metro.units import Array
 

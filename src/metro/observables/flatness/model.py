@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
@@ -12,14 +13,13 @@ import numpy as np
 from metro.observables.flatness.beliefs import FORCE, LOSS, BelievedSetting, parameters, places
 from metro.observables.flatness.beside import Beside
 from metro.observables.flatness.beside import swung as swung_beside
-from metro.observables.flatness.path import Pace, Passages
+from metro.observables.flatness.face_setting import FaceSetting
 from metro.observables.flatness.pose_field import (
     LoadSetting,
     PoseField,
     loaded_columns,
     own_columns,
 )
-from metro.observables.flatness.ringing import Ringing
 from metro.observables.flatness.rung import lossier, rung, sharper
 from metro.observables.flatness.setup import Setup, swung
 from metro.observables.flatness.tip import Known, static, terms, tip
@@ -35,98 +35,6 @@ if TYPE_CHECKING:
 
 ENTRIES = ("zx", "zy", "zz")
 FARTHEST = 0.7  # of what the tip's frequencies are off, as a logarithm: half or twice as high
-# Places across and along the feed, in radii of a disc, whose mean equals that over the disc: exactly for a
-# cubic, and to 0.2 % for a wave of three radii or more.
-ACROSS, AHEAD = np.sqrt(0.5) * np.array([[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0]])
-
-
-@dataclass(frozen=True, eq=False)
-class FaceSetting:
-    """A face at the points of its path, and beside it.
-
-    Attributes
-    ----------
-    pose : of the arm. x, y : (4 n,) places of n points, m: four about each one, which represent its disc.
-    disc : half axis of the discs along the passes, m.
-    first : index of the first point of each bin that is compared.
-    passages : of the rim over the points. pace : their times. size : of the work along x and y, m; NaN if it
-        is not known.
-    force : (3,) mean force on the tool in full engagement, N, work frame.
-    loaded : (3 · terms,) coefficients of the compliance from the load tests alone; they determine which
-        passage was the lowest.
-    ringing : None if the mass of the arm is not known; the tip then follows the force statically.
-    unplaced : (bins, 3) orthonormal heights of an offset and two tilts, which are left out of the measured
-        and the predicted heights, because the scan's place does not determine them; None where it does.
-    """
-
-    pose: str
-    x: Array
-    y: Array
-    disc: float
-    first: np.ndarray
-    passages: Passages
-    pace: Pace
-    size: tuple[float, float]
-    force: Array
-    loaded: Array
-    ringing: Ringing | None
-    unplaced: Array | None = None
-
-    def shape(self, values: Array) -> Array:
-        """Return heights of the bins, (n,) or (n, k), without what the scan's place leaves open."""
-        return values if self.unplaced is None else values - self.unplaced @ (self.unplaced.T @ values)
-
-    @cached_property
-    def middle(self) -> Passages:
-        """The passages, with the axis' position along the pass for the middle of each disc."""
-        ahead = np.tile(self.disc * AHEAD, len(self.x) // len(AHEAD))
-        return replace(self.passages, along=self.passages.along - ahead[:, None])
-
-    def weights_of(self, share: Array) -> csr_array:
-        """Weight of each passage in each bin, (bins, 4 n k), by its ``share`` of a place: few have any."""
-        from scipy.sparse import csr_array
-
-        at = np.flatnonzero(share)
-        begins = np.searchsorted(at, share.shape[1] * np.arange(len(share) + 1))
-        return self._weights @ csr_array((share.ravel()[at], at, begins), shape=(len(share), share.size))
-
-    def mean(self, values: Array) -> Array:
-        """Average the values of places, (4 n,) or (4 n, p), over the discs, and these over the bins."""
-        return np.asarray(self._weights @ values)
-
-    def binned(self, values: Array) -> Array:
-        """Average the values of points, (n,) or (n, p), over the bins."""
-        return np.asarray((np.add.reduceat(values, self.first, axis=0).T / self._count).T)
-
-    @cached_property
-    def plane(self) -> Array:
-        """Heights of an offset and two tilts, (bins, 3), each tilt ±1 at the edges of the work."""
-        across = []
-        for values, size in zip((self.x, self.y), self.size, strict=True):
-            at = self.mean(values)
-            low, high = (0.0, size) if math.isfinite(size) else (float(at.min()), float(at.max()))
-            across.append((2.0 * at - low - high) / ((high - low) or 1.0))
-        return np.column_stack([np.ones_like(across[0]), *across])
-
-    @property
-    def form(self) -> Array:
-        """Heights of three curvatures, (bins, 3), each 1 at the edges or corners of the work."""
-        _, across, along = self.plane.T
-        return np.column_stack([across**2, across * along, along**2])
-
-    @property
-    def _count(self) -> np.ndarray:
-        """Points in each bin."""
-        return np.diff(np.append(self.first, len(self.x) // len(ACROSS)))
-
-    @cached_property
-    def _weights(self) -> csr_array:
-        """Weight of each place in the mean of each bin; it is cached because a fit averages many times."""
-        from scipy.sparse import csr_array
-
-        weight = np.repeat(1.0 / self._count, self._count * len(ACROSS)) / len(ACROSS)
-        begins = np.append(len(ACROSS) * self.first, len(weight))
-        return csr_array((weight, np.arange(len(weight)), begins))
 
 
 @dataclass(frozen=True)
@@ -191,7 +99,7 @@ class FlatnessModel:
             self._cutting, setting, phases_of(self.vibration, nuisance), known
         )
         harder, rising, lossy = changes.T
-        offset = offset + setting.mean(self.setup.bowed(setting.x, setting.y, setting.size))
+        offset = offset + setting.bowed(self.setup.bowed)
         columns = self.structure.in_cut(
             (setting.force[:, None] * shared[:, None, :]).reshape(len(shared), -1)
         )
@@ -218,9 +126,35 @@ class FlatnessModel:
             return np.tile(offset + matrix @ beta, (len(nuisances), 1))
         form = np.hstack([*([setting.plane] if self.placed else []), setting.form])
         common = form @ beta[: form.shape[1]]
-        common = common + setting.mean(self.setup.bowed(setting.x, setting.y, setting.size))
+        common = common + setting.bowed(self.setup.bowed)
         predicted = [common + setting.mean(self.finished(setting, each, beta)[1]) for each in nuisances]
         return setting.shape(np.reshape(predicted, (-1, len(common))).T).T
+
+    def differences(
+        self, others: Sequence[FlatnessModel], block: Block, nuisances: Array, beta: Array
+    ) -> tuple[Array, Array]:
+        """Return differences as :meth:`metro.observables.problem.Differing.differences` does.
+
+        Each passage moves a place by its share in finishing it: what a small change of its height does.
+        """
+        setting, count = block.setting, len(block.measured)
+        if not isinstance(setting, FaceSetting):
+            base = self.predictions(block, nuisances, beta)
+            there = [other.predictions(block, nuisances[:1], beta)[0] for other in others]
+            return np.reshape(there, (-1, count)) - base[0], base[1:] - base[0]
+        phases = [phases_of(self.vibration, each) for each in nuisances]
+        at = self._cutting, setting, phases[0], tuple(beta.tolist())
+        weights, (cut, _, _) = _weights(*at), _finished(*at)
+
+        def moved_to(model: FlatnessModel, swing: tuple[float, ...]) -> Array:
+            if model is self and swing == phases[0]:
+                return np.zeros(count)
+            height = setting.averaged(weights, model._cut(setting, np.array(swing), beta) - cut)
+            return setting.shape(height + setting.bowed(model.setup.bowed - self.setup.bowed))
+
+        moved = np.array([moved_to(other, phases[0]) for other in others])
+        own = np.array([moved_to(self, swing) for swing in phases[1:]])
+        return moved.reshape(-1, count), own.reshape(-1, count)
 
     def _tip(self, setting: FaceSetting, beta: Array) -> Array:
         """Return the height of the tip at each passage by ``beta``, (n, k) m, as stiff as in load tests."""
@@ -289,13 +223,17 @@ class FlatnessModel:
         the load tests, a face would jump by what the two differ, wherever another passage becomes the lowest.
         For ``nuisance`` see :meth:`nuisance_starts`; without ``beta`` the tip is that of the load tests.
         """
-        above = _above(self._cutting, setting, phases_of(self.vibration, nuisance), self._off(setting, beta))
-        return lowest_cut(above + self._deflected(setting, beta), setting.passages.valid)
+        known = None if beta is None else tuple(beta.tolist())
+        return _finished(self._cutting, setting, phases_of(self.vibration, nuisance), known)[1:]
 
     def heights(self, setting: FaceSetting, nuisance: Array) -> Array:
         """Height of the cut at each passage by the load tests, (n, k) m; infinite if there is no passage."""
-        above = _above(self._cutting, setting, phases_of(self.vibration, nuisance), 0.0)
-        return np.where(setting.passages.valid, above + self._deflected(setting, None), np.inf)
+        return np.where(setting.passages.valid, self._cut(setting, nuisance, None), np.inf)
+
+    def _cut(self, setting: FaceSetting, nuisance: Array, beta: Array | None) -> Array:
+        """Height of the cut at each passage, (n, k) m, whatever of it another passage takes away."""
+        above = _above(self._cutting, setting, phases_of(self.vibration, nuisance), self._off(setting, beta))
+        return above + self._deflected(setting, beta)
 
     def _deflected(self, setting: FaceSetting, beta: Array | None) -> Array:
         """Height of the tip at each passage by what is linear in ``beta``, (n, k) m; None: by load tests."""
@@ -332,17 +270,40 @@ def _shaped(
     damping hold for the compliance of the load tests alone, so that they are linear in the base parameters.
     The result is cached because noise and parameters are estimated in turn, many times over.
     """
-    beta = None if known is None else np.array(known)
-    share, lowest = model.finished(setting, np.array(phases), beta)
+    beta, at = None if known is None else np.array(known), (model, setting, phases, known)
+    weights, lowest = _weights(*at), setting.mean(_finished(*at)[2])
     basis, tuning = model._basis(setting), model.tuning(model._off(setting, beta))
     harder = static(basis, setting) + rung(setting, tuning)
     share_of_force, loss = model._rings(setting, beta)
     rising = sharper(setting, tuning, harder=share_of_force, loss=loss)
     gained = harder, rising, lossier(setting, tuning)
     others = [swung_beside(each.modes, setting) for each in model._beside(setting)]
-    swings = np.concatenate([*others, np.zeros((*share.shape, 0))], axis=-1)
-    heights = np.stack([model._deflected(setting, beta), *map(model.structure.in_cut, gained)], axis=-1)
-    weights = setting.weights_of(share)
-    parts = terms(basis, setting), heights, model.structure.in_cut(swings)
-    shared, means, given = (weights @ part.reshape(share.size, -1) for part in parts)
-    return shared, setting.mean(lowest) - means[:, 0], means[:, 1:], given
+
+    swings = [model.structure.in_cut(each) for every in others for each in np.moveaxis(every, -1, 0)]
+
+    def means(parts: Iterable[Array]) -> Array:
+        averages = [setting.averaged(weights, part) for part in parts]
+        return np.reshape(averages, (-1, len(lowest))).T
+
+    shared = means(np.moveaxis(terms(basis, setting), -1, 0))
+    offset = lowest - setting.averaged(weights, model._deflected(setting, beta))
+    return shared, offset, means(map(model.structure.in_cut, gained)), means(swings)
+
+
+# The derivatives by base parameters and those by effects ask for the same, one after the other.
+@lru_cache(maxsize=4)
+def _weights(
+    model: FlatnessModel, setting: FaceSetting, phases: tuple[float, ...], known: tuple[float, ...] | None
+) -> csr_array:
+    """Return weights of the passages in each bin, (bins, k n)."""
+    return setting.weights_of(_finished(model, setting, phases, known)[1])
+
+
+# A step of a fit predicts all faces of a batch, and then asks for their derivatives where it led.
+@lru_cache(maxsize=32)
+def _finished(
+    model: FlatnessModel, setting: FaceSetting, phases: tuple[float, ...], known: tuple[float, ...] | None
+) -> tuple[Array, Array, Array]:
+    """Return the height of all cuts, the share of each in finishing a place, (n, k), and its height, (n,)."""
+    cut = model._cut(setting, np.array(phases), None if known is None else np.array(known))
+    return cut, *lowest_cut(cut, setting.passages.valid)

@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 import pandas as pd
 
-from metro.observables.flatness.model import FaceSetting
+from metro.observables.flatness.face_setting import FaceSetting
 from metro.observables.flatness.placing import plane_directions
 from metro.observables.problem import Block
 from metro.surface.footprint import RADIUS

@@ -104,9 +104,9 @@ class Ringing:
         force = np.vstack([self.force[:, :-1].reshape(-1, 3), self.force[-1, -1:]])
         lowest, ratio = self.modes.frequency[:, 0].mean(), self.damping.ratio(self.modes.frequency)
         ratio = np.broadcast_to(ratio, self.modes.frequency.shape)[:, 0].mean()
-        other = swing(float(lowest), float(ratio), force, self.step)[:-1]
+        other = swing(float(lowest), float(ratio), force, self.step)
         at_once = math.isinf(mode.frequency)
-        own = force[:-1] if at_once else swing(mode.frequency, mode.ratio, force, self.step)[:-1]
+        own = force[:-1] if at_once else swing(mode.frequency, mode.ratio, force, self.step)
         heights = mode.reach[2] * np.array(mode.reach)[:, None] * (own - other).T
         mean = [np.convolve(each, self.weights, mode="same") for each in heights]
         return np.reshape(mean, (3, self.passes, -1))

@@ -10,16 +10,13 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from metro.observables.flatness.face_setting import FaceSetting
+from metro.observables.flatness.ringing import Ringing
 from metro.surface.tip_damping import Raised
 from metro.units import Array
-
-if TYPE_CHECKING:
-    from metro.observables.flatness.model import FaceSetting
-    from metro.observables.flatness.ringing import Ringing
 
 FINE = 0.002  # relative change of the frequencies by which the slope of the ringing is taken
 LOSSIER = 0.05  # higher damping ratio to which the slope of the ringing is taken: as much as arms have

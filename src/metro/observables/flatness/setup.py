@@ -60,20 +60,38 @@ class Setup:
             place = np.linspace(-1.0, 1.0, len(pace.edge)) if len(pace.edge) > 1 else np.zeros(1)
             higher = higher + np.polynomial.legendre.legval(place, [0.0, *self.levels])[passages.number]
         for amplitude, length, exit_height in self.entry:
-            inside = pace.inside(passages)
-            higher = higher + amplitude * np.where(inside >= 0.0, np.exp(-np.abs(inside) / length), 0.0)
+            higher = higher + amplitude * _entered(length, passages, pace)
             if exit_height:
-                higher = higher + exit_height * left(pace.outside(passages), pace.radius, length)
+                higher = higher + exit_height * _left(length, passages, pace)
         return np.asarray(higher)
 
-    def bowed(self, x: Array, y: Array, size: tuple[float, float]) -> Array:
-        """Additional height of the work at points, (n,) m; ``size`` (m) of the work, whose corner is zero."""
-        if not any(self.bow) and not any(self.cubic):
-            return np.zeros(len(x))
-        u, v = 2.0 * x / size[0] - 1.0, 2.0 * y / size[1] - 1.0
-        (xx, xy, yy), (uuu, uuv, uvv, vvv) = self.bow, self.cubic
-        uu, vv = u * u, v * v
-        return np.asarray(uu * (xx + uuu * u + uuv * v) + xy * u * v + vv * (yy + uvv * u + vvv * v))
+    @property
+    def bowed(self) -> Array:
+        """Coefficients of the work's form, (7,) m, of :func:`bow_shapes`."""
+        return np.array([*self.bow, *self.cubic])
+
+
+def bow_shapes(x: Array, y: Array, size: tuple[float, float]) -> Array:
+    """Return u², u v, v², u³, u² v, u v², v³ at points, (n, 7).
+
+    u and v go from −1 to 1 over the work of a ``size``, m, whose corner is zero.
+    """
+    u, v = 2.0 * x / size[0] - 1.0, 2.0 * y / size[1] - 1.0
+    return np.stack([u * u, u * v, v * v, u**3, u * u * v, u * v * v, v**3], axis=-1)
+
+
+# A search moves other effects on beside a transient, and its height more often than its length.
+@lru_cache(maxsize=64)
+def _entered(length: float, passages: Passages, pace: Pace) -> Array:
+    """Return what remains of a step of one at the block's edge, at passages, (n, k)."""
+    inside = pace.inside(passages)
+    return np.where(inside >= 0.0, np.exp(-np.abs(inside) / length), 0.0)
+
+
+@lru_cache(maxsize=64)
+def _left(length: float, passages: Passages, pace: Pace) -> Array:
+    """Return what remains of a step of one that comes as the cutter leaves the block, at passages, (n, k)."""
+    return left(pace.outside(passages), pace.radius, length)
 
 
 def left(outside: Array, radius: float, length: float) -> Array:

@@ -4,25 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from metro.observables.flatness.beside import swung
 from metro.observables.flatness.dynamics import ArmMode
+from metro.observables.flatness.face_setting import FaceSetting
 from metro.observables.flatness.rung import lossier, rung
 from metro.surface.tip_stiffness import Basis, heights_design
 from metro.units import Array
-
-if TYPE_CHECKING:
-    from metro.observables.flatness.model import FaceSetting
 
 
 @lru_cache(maxsize=64)
 def terms(basis: Basis, setting: FaceSetting) -> Array:
     """Return the basis' terms where the tool was at each passage, (n, k, terms)."""
     at = setting.passages
-    return np.asarray(basis(at.x.T.ravel(), at.y.T.ravel()).T.reshape(-1, *at.x.T.shape).T)
+    parts = np.ascontiguousarray(basis(at.x.T.ravel(), at.y.T.ravel()).T)
+    return parts.reshape(-1, *at.x.T.shape).T
 
 
 @lru_cache(maxsize=64)
@@ -56,9 +54,15 @@ class Known:
 @lru_cache(maxsize=64)
 def tip(basis: Basis, setting: FaceSetting, known: Known) -> Array:
     """Return the height of the tip at each passage, (n, k) m, of one as stiff as in the load tests."""
-    height = terms(basis, setting) @ (setting.force @ np.reshape(known.coefficients, (3, -1)))
+    height = _along(terms(basis, setting), setting.force @ np.reshape(known.coefficients, (3, -1)))
     height = height + known.harder * (static(basis, setting) + rung(setting, known.tuning))
     height = height + known.loss * lossier(setting, known.tuning)
     for modes, reach in known.beside:
-        height = height + swung(modes, setting) @ np.array(reach)
-    return np.asarray(height)
+        height = height + _along(swung(modes, setting), np.array(reach))
+    return height
+
+
+def _along(parts: Array, values: Array) -> Array:
+    """Return ``parts`` (n, k, p), of which each lies together in memory, times ``values`` (p,): (n, k)."""
+    turned = parts.T
+    return np.asarray((values @ turned.reshape(len(values), -1)).reshape(turned.shape[1:]).T)
