@@ -34,6 +34,7 @@ def test_the_names_are_those_of_the_library():
         "{charge_drift: {time_constant_s: 4}}",
         "{entry_transient: {amplitude_um: 12, length_mm: 15}}",
         "{entry_transient: {amplitude_um: 12, length_mm: 15, exit_um: -9}}",
+        "{entry_transient: {grows_with: force, amplitude_um: 12, length_mm: 15}}",
         "{dynamometer_resonance: {frequency_hz: [900, 800, 1500], damping: 0.03}}",
         "{stiffness_scale: {joint: all, factor: 0.9}, tool_wear: {edge_growth_per_m: 0.1}}",
         "{missing_mode: {frequency_hz: 40, damping: 0.02, stiffness_n_um: 5, axis: y}}",

@@ -66,6 +66,8 @@ def surface(along, force, cut_by, x, y, *, factor):
                 way=axis,
                 dx=x - at_x,
                 dy=y - at_y,
+                length=length,
+                load=float(np.linalg.norm(force)),
             )
             over = (np.abs(lane - middle) < RADIUS) & (axis >= -LEAD) & (axis <= length + LEAD)
             lowest = np.where(over, np.minimum(lowest, cut), lowest)

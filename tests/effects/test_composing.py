@@ -214,6 +214,11 @@ COMPOSED = {
         {"amplitude_um": -30.0, "length_mm": 15.0, "exit_um": 20.0},
         lambda a, b: only("amplitude_um")(only("exit_um")(a, b), b),
     ),
+    "entry_transient with the force": (
+        {"amplitude_um": 12.0, "length_mm": 15.0},
+        {"amplitude_um": -30.0, "length_mm": 15.0},
+        only("amplitude_um"),
+    ),
     "fixture_bow": (
         {"xx_um": 5.0, "xy_um": -3.0, "yy_um": 2.0},
         {"xx_um": 1.0, "xy_um": 7.0, "yy_um": -4.0},

@@ -4,7 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from face_batch import GATES, problem
+from face_batch import GATES, RADIUS, problem
+from face_manifest import SIZE
+from scipy.signal import lfilter
 from scipy.stats import f
 from worded import in_words
 
@@ -51,6 +53,15 @@ def bowed(x, y):
 
 def spot(x, y):
     return 40e-3 * np.exp(-((x - 80.0) ** 2 + (y - 30.0) ** 2) / 200.0)
+
+
+def drooped(way, length, load, **_cut):
+    """Height, mm, of drives that droop by 0.4 µm/N and come back over 15 mm, in small steps of the force."""
+    axis = np.arange(-RADIUS, length + 2.0 * RADIUS, 0.01)
+    gone = [1.0 - np.clip(end + axis, 0.0, RADIUS) / RADIUS for end in (RADIUS, RADIUS - length)]
+    share = np.sqrt(1.0 - gone[0] ** 2) - np.sqrt(1.0 - gone[1] ** 2)  # of the cutter's width that cuts
+    droop = lfilter([1.0], [1.0, -np.exp(-0.01 / 15.0)], np.diff(share, prepend=0.0))
+    return 4e-4 * load * np.interp(way, axis, droop, left=0.0)
 
 
 HIDDEN = [
@@ -114,6 +125,33 @@ def test_a_second_vibration_is_found_beside_the_declared_one_each_with_its_own_p
         low, high = parameters(found, "path_vibration")[parameter]["ci95"]
         assert low < value < high
         assert high - low < 0.2 * value
+
+
+def test_a_droop_that_goes_with_the_force_is_one_and_not_the_same_in_all_faces():
+    task = problem(hidden=drooped)
+    base, prior = base_fit(task)
+    of_any, of_force = (e for e in fitted_to(library("flatness"), task)[0] if e.name == "entry_transient")
+    fits = {
+        each.form: fit(Candidate(task.base, (each,)), base.blocks, prior, base) for each in (of_any, of_force)
+    }
+    found = fits["with the force"]
+    assert found.total > max(base.total, fits[""].total) + 8.0
+    usual = np.mean([np.linalg.norm(block.setting.force) for block in task.role("identify")])
+    at_edge = drooped(np.zeros(1), SIZE[0], usual)[0] / 1e-3
+    reported = parameters(found, "entry_transient")
+    assert reported["grows_with"] == "force"
+    for parameter, value in {"amplitude_um": at_edge, "length_mm": 15.0}.items():
+        low, high = reported[parameter]["ci95"]
+        assert low < value < high
+        assert high - low < 0.5 * value
+
+
+def test_what_is_declared_of_a_droop_says_whether_it_goes_with_the_force():
+    values = {"amplitude_um": 40.0, "length_mm": 15.0}
+    of_any = with_declared(problem(), {"entry_transient": values}).base.setup
+    of_force = with_declared(problem(), {"entry_transient": {"grows_with": "force"} | values}).base.setup
+    assert (len(of_any.entry), len(of_any.droops)) == (1, 0)
+    assert (len(of_force.entry), len(of_force.droops)) == (0, 1)
 
 
 @pytest.mark.slow

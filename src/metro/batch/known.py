@@ -86,6 +86,7 @@ def registry(effects: Iterable[Declarable]) -> JSON:
         for form in (needed, every):
             entry["forms"] += [form] if form not in entry["forms"] else []
         entry["choices"] |= {each.name: list(each.choices) for each in effect.reported if each.choices}
+        entry["choices"] |= {name: [word] for name, word in effect.where.items() if name != "joint"}
     for entry in entries.values():
         entry["forms"].sort(key=lambda form: (len(form), form))
     return dict(sorted(entries.items()))

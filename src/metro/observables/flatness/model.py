@@ -251,7 +251,8 @@ class FlatnessModel:
 @lru_cache(maxsize=64)
 def _above(model: FlatnessModel, setting: FaceSetting, phases: tuple[float, ...], off: float) -> Array:
     """Height of the cut over the static one at each passage, (n, k) m; ``off`` of the tip's frequencies."""
-    above = model.setup.cuts(setting.x, setting.y, setting.passages, setting.pace)
+    force = float(np.linalg.norm(setting.force))
+    above = model.setup.cuts(setting.x, setting.y, setting.passages, setting.pace, force=force)
     for swing, phase in zip(model.vibration, phases, strict=True):
         above = above + swung(swing, phase, setting.passages, setting.pace)
     if setting.ringing is not None:

@@ -34,6 +34,8 @@ class Setup:
     entry : transients: for each the additional height of the tip when the axis reaches the block's edge, m,
         the way over which it decays to 1/e, m, and the additional height where the force ends, m, which
         decays alike.
+    droops: what the tip gives way by per force, m/N, when the axis reaches the block's edge and the force is
+        whole, and the way over which it comes back to 1/e, m.
     """
 
     tilt: tuple[float, float] = (0.0, 0.0)
@@ -42,14 +44,18 @@ class Setup:
     bow: tuple[float, float, float] = (0.0, 0.0, 0.0)
     cubic: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     entry: tuple[tuple[float, float, float], ...] = ()
+    droops: tuple[tuple[float, float], ...] = ()
 
     @property
     def cutting(self) -> Setup:
         """What of it :meth:`cuts` has: all but the form of the work."""
         return replace(self, bow=Setup.bow, cubic=Setup.cubic)
 
-    def cuts(self, x: Array, y: Array, passages: Passages, pace: Pace) -> Array:
-        """Additional height of the cut at the points ``x``, ``y`` (n,) at each passage, (n, k) m."""
+    def cuts(self, x: Array, y: Array, passages: Passages, pace: Pace, *, force: float) -> Array:
+        """Additional height of the cut at the points ``x``, ``y`` (n,) at each passage, (n, k) m.
+
+        ``force`` : on the tool in full engagement, N.
+        """
         about_x, about_y = self.tilt
         higher = np.zeros_like(passages.along)
         if about_x or about_y:
@@ -63,6 +69,8 @@ class Setup:
             higher = higher + amplitude * _entered(length, passages, pace)
             if exit_height:
                 higher = higher + exit_height * _left(length, passages, pace)
+        for give, length in self.droops:
+            higher = higher + give * force * _drooped(length, passages, pace)
         return np.asarray(higher)
 
     @property
@@ -94,12 +102,20 @@ def _left(length: float, passages: Passages, pace: Pace) -> Array:
     return left(pace.outside(passages), pace.radius, length)
 
 
+@lru_cache(maxsize=64)
+def _drooped(length: float, passages: Passages, pace: Pace) -> Array:
+    """Return what is left at passages, (n, k), of steps up and down with the force, over that at the edge."""
+    risen = left(pace.inside(passages), pace.radius, length)
+    return (risen - _left(length, passages, pace)) / left(np.zeros(1), pace.radius, length)
+
+
 def left(outside: Array, radius: float, length: float) -> Array:
     """Return what remains of a step of one that comes as the force falls while a cutter leaves the block.
 
     A part of the rim at the angle θ from the direction aside leaves when the axis is R sin θ before the edge:
     of the force, the remainder is the share of the cutter's width that is still cut, 1 − sin θ with
-    R (1 − cos θ) the way since the front left. Each part of the step decays over ``length`` (m) to 1/e.
+    R (1 − cos θ) the way since the front left. Each part of the step decays over ``length`` (m) to 1/e. Where
+    a cutter enters the block, the force rises as it falls there.
 
     Parameters
     ----------
