@@ -8,7 +8,9 @@ import pytest
 
 from metro.batch.batch import Batch
 from metro.observables.joint_force.friction import observe, report
+from metro.observables.joint_force.observable import LEAST_VISCOUS, _instruments
 from metro.observables.problem import Refusal
+from metro.robot.kinematics import arm_of_cell
 
 DH = [[0, 90, 500, 250], [90, 0, 0, 610], [-180, -90, 0, 70], [0, 90, 710, 0], [0, -90, 0, 0], [0, 0, 215, 0]]
 HOME = np.array([0.1, -0.4, 0.2, 0.3, 0.8, 0.2])
@@ -124,3 +126,14 @@ def test_an_arm_at_rest_is_refused_and_of_a_machine_that_is_no_arm_nothing_is_sa
     still = run(rng, "r1", np.tile(HOME, (700, 1)))
     assert report(observed(still, cell={"cell": "mill"})) == {}
     assert "no joint moves" in observed(still).reason
+
+
+def test_a_joint_that_is_at_rest_in_all_runs_leaves_finite_errors_of_its_friction():
+    """Friction by speed would have made 1e306 N m s/rad of its level over no speed, and ended the fit."""
+    batch = Batch("b", {}, {"cell": "arm", "arm": {"dh": DH}}, pd.DataFrame(), {})
+    arm = arm_of_cell(batch.cell, batch.manifest)
+    table = pd.DataFrame({"joint": range(1, 7), "fastest_deg_s": [2.0] * 5 + [0.0], "coulomb": 20.0})
+    table = table.assign(viscous=np.nan, viscous_low=np.nan, viscous_high=np.nan)
+    sigma = _instruments(batch, arm, (), table).sigma
+    viscous = sigma[-2 - 6 : -2]
+    assert viscous[5] == LEAST_VISCOUS < viscous[0] < 1e4

@@ -160,7 +160,8 @@ def _friction(arm: Arm, table: pd.DataFrame | None, blocks: Sequence[Block]) -> 
     rows = table.set_index("joint").loc[[joint + 1 for joint in joints]]
     seen = np.abs(rows["coulomb"].to_numpy())
     level = np.where(np.isfinite(seen), seen, USUAL * held)
-    fastest = np.maximum(rows["fastest_deg_s"].to_numpy() * DEG, np.finfo(float).tiny)
+    fastest = rows["fastest_deg_s"].to_numpy() * DEG
+    fastest = np.where(fastest > 0.0, fastest, np.inf)  # of a joint that is at rest it would make nothing
     half = 0.5 * (rows["viscous_high"] - rows["viscous_low"]).to_numpy()
     known = THINNING * np.hypot(rows["viscous"].to_numpy(), half / 2.0)
     change = np.where(np.isfinite(known), known, WEARING * level / fastest)
