@@ -67,6 +67,10 @@ def test_an_effect_with_all_of_its_parameters_has_no_findings(batch, known):
             "{missing_mode: {frequency_hz: 40, damping: 0.02, stiffness_n_um: 5, axis: z}}",
             'axis: found "z", expected x or y',
         ),
+        (
+            "{entry_transient: {grows_with: speed, amplitude_um: 12, length_mm: 15}}",
+            'grows_with: found "speed", expected force',
+        ),
     ],
 )
 def test_a_wrong_name_or_value_of_a_parameter_is_an_error(batch, known, message):

@@ -34,8 +34,7 @@ class FaceSetting:
     passages : of the rim over the points. pace : their times. size : of the work along x and y, m; NaN if it
         is not known.
     force : (3,) mean force on the tool in full engagement, N, work frame.
-    loaded : (3 · terms,) coefficients of the compliance from the load tests alone; they determine which
-        passage was the lowest.
+    loaded : (3 · terms,) coefficients of the compliance from the load tests alone.
     ringing : None if the mass of the arm is not known; the tip then follows the force statically.
     unplaced : (bins, 3) orthonormal heights of an offset and two tilts, which are left out of the measured
         and the predicted heights, because the scan's place does not determine them; None where it does.
