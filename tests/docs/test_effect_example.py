@@ -156,6 +156,7 @@ def test_the_table_of_what_may_be_changed_is_that_of_the_models():
             "forces",
             "springs",
             "loaded",
+            "waves",
         }  # by the batch and its load tests, or by the fit: no cause changes them
         assert named[name] == own - given, name
 

@@ -10,7 +10,8 @@ from functools import cache
 import numpy as np
 from scipy.optimize import brentq
 
-from metro.observables.deformation.model import CutWall, DeformationModel, LoadTest
+from metro.observables.deformation.model import DeformationModel
+from metro.observables.deformation.setting import CutWall, LoadTest
 from metro.observables.problem import Block, Problem
 from metro.robot.kinematics import Arm, arm_of_cell
 

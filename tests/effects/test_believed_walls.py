@@ -12,7 +12,8 @@ from metro.loop.search.trial import Gates
 from metro.loop.statement import to_json
 from metro.loop.verdict.beliefs import beliefs, strained
 from metro.observables.deformation.blocks import believed_block
-from metro.observables.deformation.model import CutWall, DeformationModel
+from metro.observables.deformation.model import DeformationModel
+from metro.observables.deformation.setting import CutWall
 from metro.wording.statements import worded
 from virtual_cell.world.arm.gears import springs
 

@@ -21,8 +21,9 @@ from metro.loop.search.search import search
 from metro.loop.search.trial import Gates
 from metro.loop.verdict.verdict import parameters
 from metro.observables.deformation.blocks import WallErrors
-from metro.observables.deformation.model import CutWall, DeformationModel
+from metro.observables.deformation.model import DeformationModel
 from metro.observables.deformation.proposals import feasible
+from metro.observables.deformation.setting import CutWall
 from metro.observables.problem import Refusal
 from metro.robot.kinematics import Arm
 

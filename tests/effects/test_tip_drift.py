@@ -9,7 +9,7 @@ import pytest
 from metro.effects import joint_backlash, stiffness_scale, tip_drift
 from metro.loop.search.search import search
 from metro.loop.search.trial import Gates
-from metro.observables.deformation.model import CutWall
+from metro.observables.deformation.setting import CutWall
 
 GATES = Gates(model_form_budget=0.007, materiality=0.004, false_additions=0.05, held_out_gain=3.0, seed=1)
 EFFECTS = (*joint_backlash.EFFECT, stiffness_scale.EFFECT[0], tip_drift.EFFECT)

@@ -307,6 +307,28 @@ def test_forms_that_the_runs_do_not_tell_apart_are_rivals_by_their_form():
     assert 0.3 < outcome.probability("bent") < 0.7
 
 
+LAWS = tuple(
+    replace(effect("bent", attribute), form=form, where={"joint": 1}, prior=0.5)
+    for form, attribute in (("joint 1", "bend"), ("joint 1, amplified", "bend"))
+)
+
+
+def test_forms_of_one_cause_that_the_runs_do_not_tell_apart_leave_it_determined():
+    outcome, verdict = judged(problem(5, truth=Wave(bend=0.3)), LAWS)
+    assert verdict["status"] == "explained"
+    assert not outcome.rivals
+    assert outcome.probability("bent") == pytest.approx(1.0, abs=0.01)
+
+
+def test_against_another_effect_the_forms_of_one_cause_count_together():
+    """Of two laws and a twin that all describe the runs alike, the cause with the two laws has two thirds."""
+    whole = tuple(replace(law, prior=1.0) for law in LAWS)
+    outcome = search(problem(5, truth=Wave(bend=0.3)), (*whole, TWIN), GATES)
+    assert outcome.names == ("bent",)
+    assert outcome.weight["bent"] == pytest.approx(2 / 3, abs=0.05)
+    assert {rival.other for rival in outcome.rivals} == {"twin"}
+
+
 def test_the_best_of_many_places_must_be_better_than_chance_makes_it():
     """An effect whose place was sought among a thousand million needs as much more evidence."""
     task = problem(6, truth=Wave(bend=0.02))

@@ -15,7 +15,8 @@ from metro.observables.arm.load_tests import (
     lacking,
     usable,
 )
-from metro.observables.deformation.model import DeformationModel, LoadTest
+from metro.observables.deformation.model import DeformationModel
+from metro.observables.deformation.setting import LoadTest
 from metro.observables.problem import Refusal
 from metro.robot.kinematics import arm_of_cell
 from metro.units import DEG, MM

@@ -6,7 +6,7 @@ import pytest
 
 from metro.observables.arm.tip_force import SYSTEMATIC
 from metro.observables.cut.upstream import OFF, mean_forces, with_forces
-from metro.observables.deformation.model import CutWall
+from metro.observables.deformation.setting import CutWall
 from metro.observables.flatness.face_setting import FaceSetting
 from metro.observables.problem import Block
 

@@ -78,10 +78,15 @@ def moving_jacobian(arm: Arm, q: Array, flange_rotation: float = 1.0) -> Array:
     ``flange_rotation``: how much of the flange's rotation counts; 1 is the truth, 0 moves the tip as the
     flange's origin is moved ([K] eq. 16 without its turn).
     """
-    at_tip = tip_jacobian(arm, q)
+    return moving_jacobian_of(arm, flange_of(arm.dh, q), flange_rotation)
+
+
+def moving_jacobian_of(arm: Arm, flange: Flange, flange_rotation: float) -> Array:
+    """Where a turn of each joint takes the tip, (..., 3, n), as above, of an arm whose flange is known."""
+    at_tip = tip_jacobian_of(arm, flange)
     if flange_rotation == 1.0:
         return at_tip
-    at_flange = flange_jacobian(arm, q)
+    at_flange = arm.work[:3, :3].T @ flange.jacobian[..., :3, :]
     moved = at_flange + flange_rotation * (at_tip - at_flange)
     # the last joint does not move the flange's origin: what rounding leaves must not pass for a lever
     return np.where(np.abs(moved) > ROUNDING, moved, 0.0)

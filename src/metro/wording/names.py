@@ -13,6 +13,7 @@ BELIEFS = {
     r"softer_joint_(\d)": "compliance of joint {} in the cut, against the load tests",
     r"lost_motion_joint_(\d)": "lost motion of joint {} in the load tests, of its twist there",
     r"wall_zero": "zero of all walls",
+    r"gear_wave_(\d+)": "wave {} of the errors of the gears along the walls, over what is usual",
     r"force_off": "force",
     r"force_off_(\w+)_([xyz])": "force by the {}, along {} and relative to its size",
     r"place_height": "height of the scanner",

@@ -62,11 +62,12 @@ def _degrees_of_freedom(whole: Array, without: Array, normals: Array) -> Array:
     the parameter's column of (N − A_i)⁻¹ and u_i = A_i b_i. The degrees are tr(C)²/tr(C²) of that matrix C.
     """
     pulled = normals @ without
-    own = np.einsum("ikc,ikc->ic", without, pulled)
-    fitted = np.einsum("ikc,kl,ilc->ic", pulled, whole, pulled)
-    mixed = np.einsum("kl,ilc,imc->ckm", whole, pulled, pulled)
-    trace = (own - fitted).sum(axis=0)
-    square = (own**2 - 2.0 * own * fitted).sum(axis=0) + np.einsum("ckm,cmk->c", mixed, mixed)
+    own = np.einsum("ikc,ikc->ci", without, pulled)
+    each = np.moveaxis(pulled, 2, 0)  # of each parameter, u_i in rows
+    between = each @ whole @ np.swapaxes(each, 1, 2)
+    fitted = np.diagonal(between, axis1=1, axis2=2)
+    trace = (own - fitted).sum(axis=1)
+    square = (own**2 - 2.0 * own * fitted).sum(axis=1) + (between**2).sum(axis=(1, 2))
     return np.asarray(np.divide(trace**2, square, out=np.zeros_like(trace), where=square > 0.0))
 
 

@@ -31,7 +31,8 @@ RIVAL_WEIGHT = 0.05  # above it, another effect in the place of one that was cho
 class Rival:
     """An effect in the place of one that was chosen: names of both, weight of the other, and its fit.
 
-    The names are with their forms (``friction_reversal (joint 3)``) where two forms of one effect are rivals.
+    The names are with their forms (``friction_reversal (joint 3)``) where the rivals are one effect at two
+    joints.
     """
 
     effect: str
@@ -101,18 +102,32 @@ def _round(
         in_place = [effect, *(fitted.candidate.effects[-1] for fitted in others)]
         odds = [1.0, *_odds(in_place, [current, *others])]
         share = _shares(smaller, [current, *others], odds, prior, gates)
-        weight[effect.name] = float(share[0])
-        for fitted, other in zip(others, share[1:], strict=True):
-            if other > RIVAL_WEIGHT:
-                rivals.append(Rival(*_titles(effect, fitted.candidate.effects[-1]), float(other), fitted))
-        fits = [current, *others]
+        pooled = _pooled(in_place, share)
+        weight[effect.name] = float(pooled[0])
+        for fitted, one, other in zip(others, in_place[1:], share[1:], strict=True):
+            if other > RIVAL_WEIGHT and _cause(one) != _cause(effect):
+                rivals.append(Rival(*_titles(effect, one), float(other), fitted))
         belief = [
-            believed(one, float(w), fitted) for one, w, fitted in zip(in_place, share, fits, strict=True)
+            (*believed(one, float(w), fitted), float(own))
+            for one, w, fitted, own in zip(in_place, pooled, [current, *others], share, strict=True)
         ]
         first = belief.index(max(belief))
         if better is None and first > 0:
             better = others[first - 1]
     return Contest(current, weight, tuple(rivals)), better
+
+
+def _cause(effect: Effect) -> tuple[str, object]:
+    """Return what is to be mended: forms of an effect that differ in nothing but their law are one cause."""
+    return effect.name, effect.where.get("joint")
+
+
+def _pooled(effects: Sequence[Effect], share: Array) -> Array:
+    """Return the weight of the cause of each effect: the sum of those of its forms."""
+    causes = [_cause(effect) for effect in effects]
+    return np.array(
+        [sum(w for w, cause in zip(share, causes, strict=True) if cause == own) for own in causes]
+    )
 
 
 def _shares(smaller: Fit, fits: Sequence[Fit], odds: Sequence[float], prior: Noise, gates: Gates) -> Array:

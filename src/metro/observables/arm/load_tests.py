@@ -11,7 +11,8 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.joint_columns import Axes
 from metro.observables.arm.lack_of_fit import LackOfFit, directions, lack_of_fit
-from metro.observables.deformation.model import DeformationModel, KnownParameters, LoadTest
+from metro.observables.deformation.model import DeformationModel
+from metro.observables.deformation.setting import KnownParameters, LoadTest
 from metro.observables.problem import Block, Refusal
 from metro.robot import identifiability
 from metro.robot.identifiability import Identifiability, NextLoad

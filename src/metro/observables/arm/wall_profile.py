@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pandas as pd
@@ -16,22 +17,32 @@ from metro.surface.profile import Bands, even, gaussian_filter, noise_gain, part
 from metro.units import MM, Array
 
 SPACING = 1 * MM
+WEIGHT = "weight{}_nm"
 ASIDE = 1 * MM  # a log's sample further than this from the line of the cut belongs to another move
 
 
 def wall_points(
-    profile: pd.DataFrame, log: Log, arm: Arm, wall: Wall, *, cutoff: float, noise: float
+    profile: pd.DataFrame,
+    log: Log,
+    arm: Arm,
+    wall: Wall,
+    *,
+    cutoff: float,
+    noise: float,
+    weight: Callable[[Array], Array],
 ) -> pd.DataFrame | Refusal:
     """Return points at each millimetre along a wall, from its trace and the log of the cut.
 
     Parameters
     ----------
     profile : ``x_mm, z_mm``. cutoff : between deformation and waviness, m. noise : of the profiler, m.
+    weight : torque of the arm's weight on each joint's link (m, n), N m, at joint angles (m, n).
 
     Returns
     -------
     pd.DataFrame
-        ``x_mm, deformation_mm, sigma_mm, waviness_mm, tracking_mm, tracking_waviness_mm``, joint angles.
+        ``x_mm, deformation_mm, sigma_mm, waviness_mm, tracking_mm, tracking_waviness_mm``, joint angles, and
+        ``weight1_nm`` … of the joints that turn.
     """
     try:
         x, z = even(profile["x_mm"].to_numpy(dtype=float) * MM, profile["z_mm"].to_numpy(dtype=float) * MM)
@@ -65,8 +76,9 @@ def wall_points(
         "tracking_mm": np.interp(points, x, tracking.deformation) / MM,
         "tracking_waviness_mm": np.interp(points, x, tracking.waviness) / MM,
     }
-    names = [*axes.commanded, *axes.positions]
-    return pd.DataFrame({**columns, **dict(zip(names, joints.T, strict=True))})
+    columns |= dict(zip([*axes.commanded, *axes.positions], joints.T, strict=True))
+    carried = weight(joints[:, : len(axes)] * axes.units)[:, axes.turning]
+    return pd.DataFrame({**columns, **dict(zip(axes.driven(WEIGHT), carried.T, strict=True))})
 
 
 def in_one_pose(joints: Array, wall: Wall, arm: Arm) -> Log:

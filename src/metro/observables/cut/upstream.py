@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from metro.observables.arm.tip_force import SYSTEMATIC
-from metro.observables.deformation.model import CutWall
+from metro.observables.deformation.setting import CutWall
 from metro.observables.flatness.face_setting import FaceSetting
 from metro.observables.problem import Block
 from metro.units import Array

@@ -11,20 +11,15 @@ import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
-from metro.joint_columns import axes_of
+from metro.joint_columns import Axes, axes_of
 from metro.observables.arm import tip_force
 from metro.observables.arm.tip_force import FORCE
 from metro.observables.arm.wall import wall
-from metro.observables.arm.wall_profile import SPACING
+from metro.observables.arm.wall_profile import SPACING, WEIGHT
 from metro.observables.cut.conditions import feed
-from metro.observables.deformation.model import (
-    AXES,
-    LOST_MOTION,
-    WALL_ZERO,
-    CutWall,
-    DeformationModel,
-    KnownParameters,
-)
+from metro.observables.deformation.gear_waves import Path, principal_waves
+from metro.observables.deformation.model import AXES, GEAR_WAVE, LOST_MOTION, WALL_ZERO, DeformationModel
+from metro.observables.deformation.setting import CutWall, KnownParameters
 from metro.observables.problem import Block
 from metro.units import ARCSEC, MM, UM, Array
 
@@ -43,8 +38,8 @@ TOUCHED = 10 * UM  # of the zero that all walls share: the touch on the work, an
 ZERO = 5 * UM  # standard error of a profile's zero against the programmed wall, before repeats show theirs
 DECLARED = 4  # walls for which that counts
 # Where gears come to rest, by joint: half of a lost motion of 2 arcsec (makers: 0.4 to 60), the same in cuts
-# alike, so that repeats do not show it; and the waves that they leave along a wall, of 2 to 30 arcsec most of
-# which are longer than the wall or shorter than the cut-off.
+# alike, so that repeats do not show it; and the waves that they leave along one wall and not along others,
+# as what changes its sign with the direction of the joint: about a tenth of all (:mod:`.gear_waves`).
 LOST = 1.0 * ARCSEC
 WAVES = 0.5 * ARCSEC
 HALF_WAVES = 4  # along a wall, the longer the higher
@@ -165,7 +160,7 @@ def _wall_block(
     read = str(force["source"].iloc[0])
     own, source = (AS_REPEATS, "dynamometer") if read == "repeat" else (0.0, read)
     setting = CutWall(commanded, actual, rate, at_points, face.normal, SPACING, longest, kept, source)
-    setting = replace(setting, harder=errors.harder(setting))
+    setting = replace(setting, harder=errors.harder(setting), weight=_weight(points, axes))
     return Block(
         run=run,
         condition=str(row["condition"]),
@@ -182,8 +177,32 @@ def _wall_block(
     )
 
 
+def _weight(points: pd.DataFrame, axes: Axes) -> Array:
+    """Torque of the arm's weight less that in mid-wall, (m, n) N m; zero on axes that do not turn."""
+    torque = np.zeros((len(points), len(axes)))
+    torque[:, axes.turning] = points[axes.driven(WEIGHT)].to_numpy()
+    return np.asarray(torque - torque[len(torque) // 2])
+
+
+def with_waves(
+    model: DeformationModel, walls: Sequence[Block], ratios: Array | None
+) -> tuple[DeformationModel, list[Block]]:
+    """Return the model and the walls with the waves that the gears leave on all of them."""
+    turning, settings = model.arm.axes.turning, [wall.setting for wall in walls]
+    paths = [
+        Path(*(one.commanded[:, turning], model.outwards(one)[:, turning], one.kept, one.spacing, one.cutoff))
+        for one in settings
+    ]
+    waves = principal_waves(paths, ratios)
+    shared = [
+        replace(wall, setting=replace(wall.setting, waves=heights))
+        for wall, heights in zip(walls, waves, strict=True)
+    ]
+    return replace(model, waves=waves[0].shape[1]), shared
+
+
 def believed_block(model: DeformationModel) -> Block:
-    """Return what is believed beforehand of the joints in the cut, the walls' zero, and the force.
+    """Return what is believed beforehand of the joints in the cut, the walls' zero, the force and the gears.
 
     A load cell that reads wrong makes all joints stiffer or softer, which is the same as a wrong force on the
     walls.
@@ -191,7 +210,8 @@ def believed_block(model: DeformationModel) -> Block:
     off = {source: math.hypot(SYSTEMATIC[source], LOADED) for source in model.forces}
     force = {f"force_off_{source}_{axis}": off[source] for source in model.forces for axis in AXES}
     lost = {f"{LOST_MOTION}{joint + 1}": TWISTED for joint in range(len(model.loaded))}
-    known = force | lost | {WALL_ZERO: TOUCHED}
+    waves = {f"{GEAR_WAVE}{wave + 1}": 1.0 for wave in range(model.waves)}
+    known = force | lost | waves | {WALL_ZERO: TOUCHED}
     sigma = [known.get(one.name, SOFTER) for one in model.believed]
     count = len(sigma)
     places = len(model.parameters) - count + np.arange(count)

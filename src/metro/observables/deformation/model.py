@@ -11,66 +11,25 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
+from metro.observables.deformation.along_wall import outwards, profile_filter, static, strayed
+from metro.observables.deformation.setting import CutWall, LoadTest
 from metro.observables.problem import Block, Parameter
 from metro.robot.drive_torques import DriveTorques
 from metro.robot.kinematics import Arm
 from metro.robot.statics import joint_torque, moving_jacobian, tip_jacobian
 from metro.robot.torsion import Torsion
 from metro.structure import Structure
-from metro.surface.profile import gaussian_filter
 from metro.units import UM, Array
 
 WALL_ZERO = "wall_zero"
 LOST_MOTION = "lost_motion_joint_"
+GEAR_WAVE = "gear_wave_"
 PASSED = 0.2  # of a joint's largest load: where its lost motion is passed
 AXES = "xyz"
-
-
-@dataclass(frozen=True, eq=False)
-class CutWall:
-    """Inputs of a run's deformation, at m points evenly spaced along the wall.
-
-    Attributes
-    ----------
-    commanded, actual : (m, n) joint angles of the log of the cut, rad. rate : (m, n) their speeds, rad/s.
-    force : (m, 3) on the tool, work frame, N. normal : (3,) of the wall, out of the material.
-    spacing, cutoff : of the points and of the profile's filter, m. kept : (n,) points that are compared.
-    source : of the force.
-    harder : (n, 3) height that the compared points gain, m, if the force is wrong along work x, y or z by its
-        whole size; None where the force is taken as right.
-    """
-
-    commanded: Array
-    actual: Array
-    rate: Array
-    force: Array
-    normal: Array
-    spacing: float
-    cutoff: float
-    kept: np.ndarray
-    source: str = ""
-    harder: Array | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class LoadTest:
-    """Static loads: joint angles (m, n) rad, forces (m, 3) N, which displacements (m, 3) were measured."""
-
-    joints: Array
-    force: Array
-    measured: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class KnownParameters:
-    """Base parameters of which something is known beforehand: their indices."""
-
-    places: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +51,7 @@ class DeformationModel:
     springs : compliances of the joints by the load tests alone. Those in the cut may deviate from them, since
         a gear is softer where it is twisted less. Empty where they do not.
     loaded : largest torque of the load tests on each joint, N m. Empty where no lost motion is believed.
+    waves : how many waves of the gears all walls share (:mod:`metro.observables.deformation.gear_waves`).
     """
 
     arm: Arm
@@ -105,6 +65,7 @@ class DeformationModel:
     forces: tuple[str, ...] = ()
     springs: tuple[float, ...] = ()
     loaded: tuple[float, ...] = ()
+    waves: int = 0
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -118,17 +79,20 @@ class DeformationModel:
         """By how much each joint is softer in the cut, its lost motion, and common errors.
 
         The lost motion is relative to the joint's twist under the largest load. Common are the zero of all
-        walls, and errors of the force relative to its size, for each of its sources along the work axes.
+        walls, errors of the force relative to its size, for each of its sources along the work axes, and the
+        waves of the gears.
         """
         softer = [Parameter(f"softer_joint_{i + 1}", "%", 0.01) for i in range(len(self.springs))]
         lost = [Parameter(f"{LOST_MOTION}{i + 1}", "%", 0.01) for i in range(len(self.loaded))]
         zero = [Parameter(WALL_ZERO, "um", UM)] if self.touched else []
         force = itertools.product(self.forces, AXES)
+        waves = (Parameter(f"{GEAR_WAVE}{i + 1}", "1") for i in range(self.waves))
         return (
             *softer,
             *lost,
             *zero,
             *(Parameter(f"force_off_{source}_{axis}", "%", 0.01) for source, axis in force),
+            *waves,
         )
 
     def compliance(self, beta: Array) -> Array:
@@ -180,25 +144,27 @@ class DeformationModel:
 
     def _lost_in_test(self, setting: LoadTest) -> Array:
         """Return what load tests gain by that way, (n, k) m."""
-        moved, torque = _static(self.arm, self.flange_rotation, setting)
+        moved, torque = static(self.arm, self.flange_rotation, setting)
         lost = self._lost(torque)
         return np.asarray((moved[..., : lost.shape[1]] * lost[:, None, :])[setting.measured])
 
     def _lost_in_cut(self, setting: CutWall) -> Array:
         """Return what a wall gains by that way, (n, k) m."""
-        out, torque = _outwards(self.arm, self.flange_rotation, setting)
+        out, torque = outwards(self.arm, self.flange_rotation, setting)
         lost = self._lost(self.structure.in_cut(torque) / self.torsion.factors(torque.shape[1]))
-        smooth = _filter(len(out), setting.spacing, setting.cutoff)[setting.kept]
+        smooth = profile_filter(len(out), setting.spacing, setting.cutoff)[setting.kept]
         return np.asarray(smooth @ (out[:, : lost.shape[1]] * lost))
 
     def _off(self, setting: CutWall) -> Array:
-        """Return what a wall gains per unit of its zero, and of what the force is off, (n, k).
+        """Return what a wall gains per unit of its zero, of what the force is off, and of the waves, (n, k).
 
-        That holds for the compliances of the load tests alone, so that it is linear in the base parameters.
+        That of the force holds for the compliances of the load tests alone, so that it is linear in the base
+        parameters.
         """
         zero = np.ones((len(setting.kept), int(self.touched)))
         harder = np.zeros((len(zero), len(AXES))) if setting.harder is None else setting.harder
-        return np.hstack([zero, *(harder * (source == setting.source) for source in self.forces)])
+        waves = np.zeros((len(zero), self.waves)) if setting.waves is None else setting.waves
+        return np.hstack([zero, *(harder * (source == setting.source) for source in self.forces), waves])
 
     def believed_force(self, setting: CutWall, beta: Array) -> CutWall:
         """Return the wall with the force that the base parameters say, instead of the one that was read."""
@@ -220,12 +186,12 @@ class DeformationModel:
 
     def deflection(self, setting: CutWall, compliance: Array) -> Array:
         """Deflection of the tip in the cut, (m, 3) m, work frame, for joint compliances (n,)."""
-        moved, _ = _static(self.arm, self.flange_rotation, setting)
+        moved, _ = static(self.arm, self.flange_rotation, setting)
         return np.asarray(np.einsum("mai,mi->ma", moved, self.twists(setting, compliance)))
 
     def twists(self, setting: CutWall, compliance: Array) -> Array:
         """Twist of the joints in the cut, (m, n) rad."""
-        _, torque = _static(self.arm, self.flange_rotation, setting)
+        _, torque = static(self.arm, self.flange_rotation, setting)
         return self.torsion.in_cut(self.structure.in_cut(torque), compliance)[0]
 
     def per_newton(self, setting: CutWall, compliance: Array) -> Array:
@@ -234,18 +200,21 @@ class DeformationModel:
         The joints are linear springs here. The error of the force is assumed to vary along the wall as the
         force does.
         """
-        moved, _ = _static(self.arm, self.flange_rotation, setting)
+        moved, _ = static(self.arm, self.flange_rotation, setting)
         at_tip = tip_jacobian(self.arm, setting.commanded)
         size = np.linalg.norm(setting.force, axis=1)
         share = size / max(float(size.max()), np.finfo(float).tiny)
         columns = np.einsum("m,a,mai,i,mbi->mb", share, setting.normal, moved, compliance, at_tip)
-        return np.asarray(_filter(len(size), setting.spacing, setting.cutoff)[setting.kept] @ columns)
+        return np.asarray(profile_filter(len(size), setting.spacing, setting.cutoff)[setting.kept] @ columns)
+
+    def outwards(self, setting: CutWall) -> Array:
+        """Return how far a turn of each joint moves the tip out of the wall along its path, (m, n) m/rad."""
+        return outwards(self.arm, self.flange_rotation, setting)[0]
 
     def per_radian(self, setting: CutWall) -> Array:
         """Height of the wall, (n,) m/rad, that turns of all joints make, each by itself: root of squares."""
-        outwards, _ = _outwards(self.arm, self.flange_rotation, setting)
-        height = np.linalg.norm(outwards[:, self.arm.axes.turning], axis=1)
-        return np.asarray(_filter(len(height), setting.spacing, setting.cutoff)[setting.kept] @ height)
+        height = np.linalg.norm(self.outwards(setting)[:, self.arm.axes.turning], axis=1)
+        return np.asarray(profile_filter(len(height), setting.spacing, setting.cutoff)[setting.kept] @ height)
 
     def largest_twists(self, blocks: Sequence[Block]) -> tuple[Array, Array]:
         """Approximate compliance of each joint, (n,) rad/(N m), and its largest torsion in a batch, (n,) rad.
@@ -264,24 +233,26 @@ class DeformationModel:
         compliance = np.maximum(estimate, 0.01 * estimate.max())
         settings: list[Any] = [block.setting for block in blocks]
         forced = [one for one in settings if isinstance(one, CutWall | LoadTest)]
-        torque = np.vstack([_static(self.arm, self.flange_rotation, one)[1] for one in forced])
+        torque = np.vstack([static(self.arm, self.flange_rotation, one)[1] for one in forced])
         return compliance, np.abs(torque).max(axis=0) * compliance
 
     def largest_in_cut(self, blocks: Sequence[Block]) -> Array:
         """Largest torque of the cuts on the link of each joint, (n,) N m."""
         settings: list[Any] = [block.setting for block in blocks]
         walls = [one for one in settings if isinstance(one, CutWall)]
-        torques = [_static(self.arm, self.flange_rotation, wall)[1] for wall in walls]
+        torques = [static(self.arm, self.flange_rotation, wall)[1] for wall in walls]
         return np.asarray(np.abs(np.vstack(torques)).max(axis=0, initial=0.0))
 
     def _cut(self, setting: CutWall, compliance: Array) -> tuple[Array, Array]:
-        out, torque = _outwards(self.arm, self.flange_rotation, setting)
+        out, torque = outwards(self.arm, self.flange_rotation, setting)
         twist, slope = self.torsion.in_cut(self.structure.in_cut(torque), compliance)
-        held = self._held(setting)
+        held = self._held(setting) - (
+            0.0 if setting.weight is None else self.structure.in_cut(setting.weight)
+        )
         twist, slope = twist - held * compliance, slope - held
         # The prediction passes the same filter as the profile, because that matters at the entry.
-        smooth = _filter(len(out), setting.spacing, setting.cutoff)[setting.kept]
-        constant = (out * (twist - slope * compliance)).sum(axis=1) + _strayed(self.arm, setting)
+        smooth = profile_filter(len(out), setting.spacing, setting.cutoff)[setting.kept]
+        constant = (out * (twist - slope * compliance)).sum(axis=1) + strayed(self.arm, setting)
         constant = constant + self.give * (setting.force @ setting.normal)
         return smooth @ (out * slope), smooth @ constant
 
@@ -291,7 +262,7 @@ class DeformationModel:
         return np.asarray(self.structure.in_cut(friction) / self.torsion.factors(friction.shape[1]))
 
     def _loaded(self, setting: LoadTest, compliance: Array) -> tuple[Array, Array]:
-        moved, torque = _static(self.arm, self.flange_rotation, setting)
+        moved, torque = static(self.arm, self.flange_rotation, setting)
         twist, slope = self.torsion.at_rest(torque, compliance)
         constant = np.einsum("mai,mi->ma", moved, twist - slope * compliance)
         return (moved * slope[:, None, :])[setting.measured], constant[setting.measured]
@@ -299,30 +270,3 @@ class DeformationModel:
 
 def _calibrating(blocks: Sequence[Block]) -> list[Block]:
     return [block for block in blocks if block.role == "calibrate" and not block.belief]
-
-
-@lru_cache(maxsize=1024)
-def _static(arm: Arm, flange_rotation: float, setting: CutWall | LoadTest) -> tuple[Array, Array]:
-    """Displacement of the tip per turn of each joint (m, 3, n), and the torques of the force on it (m, n)."""
-    joints = setting.commanded if isinstance(setting, CutWall) else setting.joints
-    torque = -joint_torque(tip_jacobian(arm, joints), setting.force)
-    return moving_jacobian(arm, joints, flange_rotation), torque
-
-
-@lru_cache(maxsize=1024)
-def _outwards(arm: Arm, flange_rotation: float, setting: CutWall) -> tuple[Array, Array]:
-    """Displacement of the tip out of the wall per turn of each joint (m, n), and the torques of the force."""
-    moved, torque = _static(arm, flange_rotation, setting)
-    return np.einsum("a,mai->mi", setting.normal, moved), torque
-
-
-@lru_cache(maxsize=256)
-def _strayed(arm: Arm, setting: CutWall) -> Array:
-    """Tracking error of the tip along the wall's normal, (m,) m."""
-    return np.asarray((arm.tip(setting.actual) - arm.tip(setting.commanded)) @ setting.normal)
-
-
-@lru_cache(maxsize=32)
-def _filter(points: int, spacing: float, cutoff: float) -> Array:
-    """Return the filter of the profile as a matrix (points, points)."""
-    return gaussian_filter(np.eye(points), spacing, cutoff)

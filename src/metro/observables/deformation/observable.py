@@ -12,22 +12,32 @@ import pandas as pd
 
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
+from metro.joint_columns import axes_of
 from metro.observables.arm import tip_force
 from metro.observables.arm.give import GivingArm, giving_arm
+from metro.observables.arm.idle_runs import carried_weight, of_idle_logs
 from metro.observables.arm.load_tests import best_compliance, calibration, lacking, largest_loads
 from metro.observables.arm.no_arm import no_arm
 from metro.observables.arm.tip_force import Log
-from metro.observables.arm.wall import Wall, wall
-from metro.observables.arm.wall_profile import wall_points
+from metro.observables.arm.wall import wall
+from metro.observables.arm.wall_profile import WEIGHT, wall_points
 from metro.observables.deformation import NAME, TABLES
-from metro.observables.deformation.blocks import SYSTEMATIC, WallErrors, believed_block, cutoff, wall_blocks
+from metro.observables.deformation.blocks import (
+    SYSTEMATIC,
+    WallErrors,
+    believed_block,
+    cutoff,
+    wall_blocks,
+    with_waves,
+)
 from metro.observables.deformation.model import DeformationModel
 from metro.observables.deformation.proposals import feasible
 from metro.observables.deformation.report import arm_block, tip_forces
 from metro.observables.observable import Observable
 from metro.observables.problem import BaseFit, Problem, Refusal
 from metro.robot.kinematics import Arm, arm_of_cell
-from metro.units import JSON, MM
+from metro.same import Same
+from metro.units import JSON, MM, Array
 
 SCATTER = 0.005  # of a joint from run to run: what scatters is the force, which each wall allows for
 
@@ -79,9 +89,7 @@ def _observed(
     tables["tip_force"] = force if isinstance(force, Refusal) else force.assign(source=source)
     if run in batch.with_files("profile"):
         lost = len(cut.tip) and not cut.followed
-        points = (
-            Refusal(tip_force.NO_SET_POINTS) if lost else _points(batch, read("profile", run), log, face, arm)
-        )
+        points = Refusal(tip_force.NO_SET_POINTS) if lost else _points(batch, run, read, log, arm)
         tables["profile_points"] = points
     return tables
 
@@ -98,15 +106,15 @@ def by_repeat(batch: Batch, force: pd.DataFrame, others: Sequence[pd.DataFrame])
     return force
 
 
-def _points(
-    batch: Batch, profile: pd.DataFrame, log: Log | Refusal, face: Wall, arm: Arm
-) -> pd.DataFrame | Refusal:
+def _points(batch: Batch, run: str, read: Tables, log: Log | Refusal, arm: Arm) -> pd.DataFrame | Refusal:
     """Points along a wall, or why the trace cannot be placed on it."""
     if isinstance(log, Refusal):
         return log
+    face, profile = wall(batch, run), read("profile", run)
     if not face.normal.any():
         return Refusal("direction is neither up nor down: which wall was traced is not known")
-    return wall_points(profile, log, arm, face, cutoff=cutoff(batch), noise=_noise(batch))
+    weight = partial(carried_weight, of_idle_logs(Same(batch), Same(read)), arm.dh)
+    return wall_points(profile, log, arm, face, cutoff=cutoff(batch), noise=_noise(batch), weight=weight)
 
 
 def _noise(batch: Batch) -> float:
@@ -137,6 +145,7 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         f"Profiles and predictions are low-passed at {cutoff(batch) / MM:g} mm (ISO 16610-21); "
         "half of that is left out at both ends.",
         *said,
+        *_of_weight(observed["profile_points"]),
         *notes,
     )
     forces = tuple(dict.fromkeys(block.setting.source for block in walls))
@@ -147,11 +156,26 @@ def problem(batch: Batch, observed: Mapping[str, pd.DataFrame], _identified: JSO
         springs=tuple(np.maximum(softness, 0.0).tolist()),
         loaded=tuple(largest_loads(model, observed["arm_loads"]).tolist()),
     )
+    base, walls = with_waves(base, walls, _ratios(batch, model.arm))
     scatter = np.array([0.0 if one in base.believed else SCATTER for one in base.parameters])
     return Problem(
         NAME, "mm", MM, base, (believed_block(base), *calibrate, *walls), scatter,
         beside.share / math.sqrt(3.0), tuple(notes), feasible(walls, calibrate, model.arm, errors),
     )  # fmt: skip
+
+
+def _of_weight(points: pd.DataFrame) -> list[str]:
+    """Say so where the walls are predicted without what the weight of the arm does along them."""
+    known = points[axes_of(points).driven(WEIGHT)].to_numpy().any()
+    return (
+        [] if known else ["How the arm bends along a wall by its own weight is not known without idle runs."]
+    )
+
+
+def _ratios(batch: Batch, arm: Arm) -> Array | None:
+    """Return the turns of the motor per turn of each joint that turns; None where they are not declared."""
+    declared = (batch.cell.get("drives") or {}).get("gear_ratio")
+    return None if declared is None else np.asarray(declared, dtype=float)[arm.axes.turning]
 
 
 def report(

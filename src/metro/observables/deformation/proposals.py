@@ -10,7 +10,7 @@ import numpy as np
 
 from metro.observables.cut.conditions import turn_about_z
 from metro.observables.deformation.blocks import SYSTEMATIC, ZERO, WallErrors
-from metro.observables.deformation.model import CutWall, LoadTest
+from metro.observables.deformation.setting import CutWall, LoadTest
 from metro.observables.problem import Block, Made, Proposal
 from metro.robot.kinematics import Arm
 from metro.units import DEG, Array
@@ -104,6 +104,8 @@ def _turned(setting: CutWall, joints: Array, turn: float) -> CutWall:
         rate=np.zeros_like(still),
         force=setting.force @ rotation.T,
         normal=rotation @ setting.normal,
+        weight=None,  # in one pose neither the weight nor the gears move the tip
+        waves=None,
     )
 
 

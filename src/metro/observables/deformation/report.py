@@ -15,7 +15,8 @@ from metro.observables.arm.load_tests import fitted_loads, in_words, joint_obser
 from metro.observables.arm.tip_force import FORCE
 from metro.observables.arm.wall import Wall, wall
 from metro.observables.deformation.blocks import ZERO
-from metro.observables.deformation.model import CutWall, DeformationModel
+from metro.observables.deformation.model import DeformationModel
+from metro.observables.deformation.setting import CutWall
 from metro.observables.problem import BaseFit, Block, Problem, Refusal
 from metro.observables.quantity import quantity
 from metro.robot.kinematics import arm_of_cell

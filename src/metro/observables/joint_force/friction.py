@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 import pandas as pd
@@ -11,10 +10,10 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
 from metro.joint_columns import Axes
-from metro.observables.arm.load_tests import joint_places
+from metro.observables.arm.idle_runs import of_idle_logs
 from metro.observables.problem import Refusal
 from metro.robot.drives import declared, drives_of_cell
-from metro.robot.friction import Friction, of_idle_runs
+from metro.robot.friction import Friction
 from metro.robot.kinematics import Geometry, arm_of_cell
 from metro.robot.motion import Motion
 from metro.robot.rigid_body import gravity_regressor
@@ -25,25 +24,7 @@ UNITS = {"coulomb": "N m", "viscous": "N m s/rad"}
 LINEAR = "a linear axis, whose drive is not evaluated"
 FALLING = "friction falls with the speed here, as it does just above rest: no viscous friction is seen"
 BINS = 12  # of speed, per direction, in the figure
-LEAST_SAMPLES = 100
 CLEAR = 0.2  # of a Coulomb level, the residual of the idle runs below which the state of friction is seen
-
-
-@lru_cache(maxsize=1)
-def of_idle_logs(batch: Same[Batch], read: Same[Tables]) -> tuple[Friction, Motion] | Refusal:
-    """Identify the friction of all idle runs together; with their motion. It is asked for twice."""
-    arm = arm_of_cell(batch.value.cell, batch.value.manifest)
-    if arm is None:
-        return Refusal("")  # without an arm there is nothing to report as missing
-    table = read.value("robot")
-    idle = [rows for _, rows in table[table["log"] == "idle"].groupby("run") if len(rows) >= LEAST_SAMPLES]
-    if not idle:
-        return Refusal("no run has an idle_log")
-    runs = [(r["t_s"].to_numpy(), joint_places(r, arm), _torques(r, arm.axes)) for r in idle]
-    try:
-        return of_idle_runs(arm.dh, runs)
-    except ValueError as error:
-        return Refusal(f"idle runs: {error}")
 
 
 def observe(batch: Batch, read: Tables) -> dict[str, pd.DataFrame] | Refusal:
@@ -78,13 +59,6 @@ def rubbed(found: tuple[Friction, Motion] | Refusal, dh: Geometry, q: Array, tor
     clear = friction.noise < CLEAR * np.nan_to_num(level)
     weight = gravity_regressor(dh, q) @ friction.others
     return np.asarray((torque - weight - np.nan_to_num(offset)) / np.where(clear, level, np.nan))
-
-
-def _torques(log: pd.DataFrame, axes: Axes) -> Array:
-    """Torques of all joints (m, n), N m; zero of a linear axis, whose drive is not evaluated."""
-    torque = np.zeros((len(log), len(axes)))
-    torque[:, axes.turning] = log[axes.torques].to_numpy(dtype=float)
-    return torque
 
 
 def _table(friction: Friction, log: Motion, relative: Array, axes: Axes) -> pd.DataFrame:

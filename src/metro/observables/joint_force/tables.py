@@ -11,6 +11,7 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
 from metro.observables.arm import tip_force
+from metro.observables.arm.idle_runs import of_idle_logs
 from metro.observables.arm.no_arm import no_arm
 from metro.observables.arm.tip_force import FORCE
 from metro.observables.arm.wall import wall
@@ -55,7 +56,7 @@ def observe(batch: Batch, read: Tables, _identified: JSON) -> dict[str, pd.DataF
             forces.append(force.assign(run=run))
     if not torques and not refused:
         return Refusal("no run has a robot_log, an idle_log and a dynamometer record")
-    rubbed, of_idle = friction.observe(batch, read), friction.of_idle_logs(Same(batch), Same(read))
+    rubbed, of_idle = friction.observe(batch, read), of_idle_logs(Same(batch), Same(read))
     return {
         **({"joint_torque": with_friction(torques, arm, of_idle)} if torques else {}),
         **({"tool_force": pd.concat(forces, ignore_index=True)} if forces else {}),
