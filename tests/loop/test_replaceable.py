@@ -109,6 +109,30 @@ def test_only_those_that_could_are_fitted_in_a_contest(monkeypatch):
     assert [rival.pair for rival in contest.rivals] == [("bend", "twin")]
 
 
+def of_joint(form, prior):
+    """One of the laws by which joint 1 may be bent."""
+    return replace(effect("bent", "bend"), form=form, where={"joint": 1}, prior=prior)
+
+
+def test_a_cause_whose_forms_have_more_weight_together_takes_the_place_of_an_effect_that_has_less():
+    """Each law has two sevenths, and the effect that is in the model three."""
+    laws = of_joint("plain", 1.0), of_joint("amplified", 1.0)
+    base, current, prior = fits(Wave(bend=0.2), replace(TWIN, prior=1.5))
+    contest = contested(base, current, (replace(TWIN, prior=1.5), *laws), prior, GATES)
+    assert [one.name for one in contest.final.candidate.effects] == ["bent"]
+    assert contest.weight["bent"] == pytest.approx(4 / 7, abs=0.05)
+    assert [rival.pair for rival in contest.rivals] == [("bent", "twin")]
+
+
+def test_of_the_forms_of_a_cause_the_one_with_the_most_weight_takes_its_place():
+    rare, usual = of_joint("rare", 0.1), of_joint("usual", 0.9)
+    base, current, prior = fits(Wave(bend=0.2), rare)
+    contest = contested(base, current, (rare, usual), prior, GATES)
+    assert [one.form for one in contest.final.candidate.effects] == ["usual"]
+    assert contest.weight["bent"] == pytest.approx(1.0, abs=0.01)
+    assert contest.rivals == ()
+
+
 def test_a_likeness_that_leaves_much_beside_all_is_fitted_in_the_place_of_none(monkeypatch):
     like = replace(TWIN, name="like", resembled=True)
     base, current, prior = fits(Wave(bend=0.2, ripple=0.3), BEND)

@@ -559,3 +559,18 @@ def test_repeats_show_how_large_the_zero_of_a_trace_is(built):
     assert zero(0.0, 400) < 0.2 * ZERO
     verifying = [replace(walls[0], role="validate", measured=x * walls[0].measured) for x in (1.0, 9.0)]
     assert with_zeros([*verifying, walls[0]])[0].unidentified[0, 0] == pytest.approx(ZERO)
+
+
+def test_an_arm_that_is_half_as_stiff_in_the_cut_bends_twice_as_far_by_its_weight(cell):
+    _, task = cell.task()
+    block = task.role("identify")[0]
+    light = replace(block, setting=replace(block.setting, weight=None))
+    beta = np.concatenate([1.0 / STIFFNESS, np.zeros(len(task.base.believed))])
+
+    def bent(model):
+        own, without = (model.design(one, np.zeros(0))[0] @ beta for one in (block, light))
+        return own - without
+
+    soft = replace(task.base, structure=Structure(0.5))
+    assert np.ptp(bent(task.base)) > 1e-6
+    np.testing.assert_allclose(bent(soft), 2.0 * bent(task.base), rtol=1e-9)
