@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from metro.batch.batch import Batch
@@ -24,6 +25,8 @@ class _Declared:
     known: Mapping[str, Mapping[str, Any]]
 
     def sampled(self, problem: Problem) -> Task:
+        if fault := without_weight(problem):
+            return Refusal(fault)
         return with_declared(problem, self.known) if self.known else problem
 
     def labelled(self, problem: Labelled) -> Task:
@@ -39,6 +42,25 @@ def pose(
     """Pose the problem of an observable, its base model with what the manifest declares as known."""
     task: Task = observable.problem(batch, observed, identified)
     return task.handled_by(_Declared(batch.manifest.get("known") or {}))
+
+
+def without_weight(problem: Problem) -> str:
+    """Say which run has an element that no fit can weigh; "" where there is none.
+
+    A standard error that is not finite, or whose square is not, would end a fit far from where it was made.
+    """
+    for block in problem.blocks:
+        with np.errstate(over="ignore", divide="ignore"):
+            weight = 1.0 / block.sigma**2
+        usable = np.isfinite(block.measured) & np.isfinite(weight) & (weight > 0.0)
+        if not usable.all():
+            where = int(np.argmin(usable))
+            count = f"{len(usable) - int(usable.sum())} of {len(usable)} values"
+            return (
+                f"run {block.run}: {block.axis[where]} is {block.measured[where]:.3g} (SI) with a standard "
+                f"error of {block.sigma[where]:.3g}: {count} cannot be compared with a model"
+            )
+    return ""
 
 
 def merged(identified: JSON, blocks: JSON) -> JSON:
