@@ -131,4 +131,43 @@ def test_a_batch_that_the_check_refuses_is_told_with_the_first_error(unread):
 def test_a_batch_that_waits_and_is_sound_is_not_refused(unread):
     printed = CliRunner(env={"COLUMNS": "200"}).invoke(app, ["status"]).stdout
     assert "refused" not in printed
-    assert "ingest, identify, report (missing)" in printed
+    assert "ingest, identify, report (not made yet)" in printed
+
+
+STOPPED = "reports/late/findings.json\t-\tloop\tlogs/loop/late.log\tmissing\tupdate pending"
+
+
+@pytest.mark.parametrize(
+    ("log", "told"),
+    [
+        (
+            "Traceback (most recent call last):\n  …\nIndexError: too many indices\n\n",
+            "IndexError: too many indices",
+        ),
+        ("closing the loop\nMemoryError\n", "MemoryError"),
+        (
+            "metro.batch.findings.ContractError: runs.csv: row 3\n",
+            "metro.batch.findings.ContractError: runs.csv: row 3",
+        ),
+        ("closing the loop 10/10\n", ""),  # it ran to its end; its output was removed later
+        ("", ""),
+    ],
+)
+def test_a_stage_that_failed_is_told_with_the_end_of_its_log(snakemake, own_campaign, log, told):
+    snakemake.stdout += f"\n{STOPPED}"
+    (own_campaign / "logs/loop").mkdir(parents=True)
+    (own_campaign / "logs/loop/late.log").write_text(log, encoding="utf-8")
+    content = json.loads(CliRunner().invoke(app, ["status", "--json"]).stdout)["batches"]
+    printed = CliRunner(env={"COLUMNS": "200"}).invoke(app, ["status"]).stdout
+    if told:
+        assert content["late"]["failed"] == f"loop failed: {told} (logs/loop/late.log)"
+        assert f"loop failed: {told}" in printed
+        assert "1 failed: after mending the cause" in printed
+    else:
+        assert "failed" not in content["late"]
+        assert "failed" not in printed
+
+
+def test_a_log_that_is_not_there_says_nothing(snakemake):
+    snakemake.stdout += f"\n{STOPPED}"
+    assert "failed" not in CliRunner(env={"COLUMNS": "200"}).invoke(app, ["status"]).stdout

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Iterable, Mapping
@@ -20,7 +21,10 @@ from metro.commands.workflow_file import workflow_file
 
 STAGES = ("ingest", "identify", "predict", "loop", "verdict", "report")
 COLUMNS = ("output_file", "rule", "status", "plan")
+LOGS = "log-file(s)"
 LAST_LINES = 20
+# How the log of a stage ends that failed: the last line of a traceback, or what was wrong with its input.
+_FAILED = re.compile(r"([\w.]*(Error|Exception|Interrupt|OutOfTime)\b|error\b|Killed)")
 
 
 @dataclass
@@ -28,11 +32,15 @@ class BatchStatus:
     """Stages that must run, in their order, with snakemake's reason; verdict by observable.
 
     ``refused`` : the first error that the check of its raw files finds; "" where there is none.
+    ``logs`` : of the stages that have no output, in snakemake's order of outputs.
+    ``failed`` : the stage that failed, how its log ends, and where that is; "" where none did.
     """
 
     needs: dict[str, str] = field(default_factory=dict)
     verdicts: dict[str, str] = field(default_factory=dict)
     refused: str = ""
+    logs: dict[str, str] = field(default_factory=dict)
+    failed: str = ""
 
 
 def status_command(snakefile: Path | None, reports: Path, as_json: bool) -> None:
@@ -46,6 +54,7 @@ def status_command(snakefile: Path | None, reports: Path, as_json: bool) -> None
     batches, summary = planned(_ask_snakemake(workflow))
     for name, batch in batches.items():
         batch.verdicts = verdicts(reports / name)
+        batch.failed = failure(batch)
     _look_for_refused({name: batch for name, batch in batches.items() if STAGES[0] in batch.needs}, workflow)
     if as_json:
         content = {
@@ -54,6 +63,7 @@ def status_command(snakefile: Path | None, reports: Path, as_json: bool) -> None
                 "needs": batch.needs,
                 "verdicts": batch.verdicts,
                 **({"refused": batch.refused} if batch.refused else {}),
+                **({"failed": batch.failed} if batch.failed else {}),
             }
             for name, batch in batches.items()
         }
@@ -67,6 +77,11 @@ def status_command(snakefile: Path | None, reports: Path, as_json: bool) -> None
     waiting = sum(bool(batch.needs) for batch in batches.values())
     need = f"{waiting} of {len(batches)} batches need snakemake" if waiting else "every batch is up to date"
     sys.stdout.write(need + (", and so does the summary\n" if summary else "\n"))
+    failed = [name for name, batch in batches.items() if batch.failed and not batch.refused]
+    if failed:
+        sys.stdout.write(
+            f"{len(failed)} failed: after mending the cause, snakemake goes on where it stopped\n"
+        )
     if refused:
         sys.stdout.write(f"{refused} refused: metro check says all that is to be mended\n")
 
@@ -101,6 +116,8 @@ def planned(lines: Iterable[str]) -> tuple[dict[str, BatchStatus], bool]:
             batch = batches.setdefault(Path(row["output_file"]).parent.name, BatchStatus())
             if pending:
                 batch.needs.setdefault(row["rule"], _reason(row["status"]))
+                if row["status"] == "missing" and row.get(LOGS):
+                    batch.logs.setdefault(row["rule"], row[LOGS].split(",")[0])
         else:
             summary |= pending
     for batch in batches.values():
@@ -115,6 +132,17 @@ def verdicts(reports: Path) -> dict[str, str]:
         return {}
     content = json.loads(path.read_text(encoding="utf-8"))
     return {name: str(entry.get("status")) for name, entry in (content.get("observables") or {}).items()}
+
+
+def failure(batch: BatchStatus) -> str:
+    """Say which stage without output failed when it last ran, by the end of its log; "" where none did."""
+    for stage in STAGES:
+        log = Path(batch.logs.get(stage, ""))
+        lines = log.read_text("utf-8", "replace").split("\n") if stage in batch.logs and log.is_file() else []
+        last = next((line.strip() for line in reversed(lines) if line.strip()), "")
+        if _FAILED.match(last):
+            return f"{stage} failed: {last} ({log})"
+    return ""
 
 
 def _look_for_refused(unread: Mapping[str, BatchStatus], workflow: Path) -> None:
@@ -147,7 +175,7 @@ def _ask_snakemake(snakefile: Path) -> list[str]:
 
 def _reason(status: str) -> str:
     """Return snakemake's reason; a stage that is "ok" itself runs because one before it does."""
-    return "a stage before it" if status == "ok" else status
+    return {"ok": "a stage before it", "missing": "not made yet"}.get(status, status)
 
 
 def _needs(batch: BatchStatus) -> str:
@@ -155,6 +183,8 @@ def _needs(batch: BatchStatus) -> str:
         return "up to date"
     if batch.refused:
         return f"refused: {batch.refused}"
+    if batch.failed:
+        return batch.failed
     stages = list(batch.needs)
     reason = next((why for why in batch.needs.values() if why != "a stage before it"), "")
     return ", ".join(stages) + (f" ({reason})" if reason else "")
