@@ -1,5 +1,6 @@
 """A force record whose bookkeeping is wrong is found, with the line to write; one that is right is not."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -170,3 +171,33 @@ def test_wrong_axes_of_a_ball_end_that_nobody_declared_are_found_with_the_end(ma
     (slip,) = contradictions(given, CUTTER, SENSOR, (BALL,))
     assert true_axes(matrix).removeprefix("Likely: ").removeprefix("then write ") in slip.text
     assert "with a ball end of the tool" in slip.text
+
+
+@pytest.mark.parametrize(
+    ("factor", "least", "way"),
+    [(1e7, 850 * 1e7 / 1e5, "large"), (1e3, 850 * 1e3 / 1e5, "large"), (1e-3, 20 / 0.85, "small")],
+)
+def test_a_wrong_unit_of_all_channels_is_no_slip_of_the_axes(factor, least, way):
+    """K_tc of 850 N/mm² is between 20 and 1e5, which are the least and the largest of any material."""
+    (slip,) = contradictions([one.mapped(factor * np.eye(3)) for one in records()], CUTTER, SENSOR)
+    assert slip.column == "instruments.dynamometer"
+    told = re.search(r"at least (\S+) times too (large|small)", slip.remedy)
+    assert float(told[1]) == pytest.approx(least, rel=0.05)
+    assert told[2] == way
+    assert "Check the unit of the force columns" in slip.remedy
+    assert "axes" not in slip.remedy
+
+
+QUARTER = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # with K_tc > 0 and K_rc < 0
+
+
+@pytest.mark.parametrize("matrix", [*FEW[1:], QUARTER], ids=axes_text)  # FEW[0] turns z, which no wave shows
+def test_the_unit_is_not_blamed_alone_where_the_axes_are_exchanged_too(matrix):
+    assert "Check the unit of the force columns" not in said([one.mapped(1e5 * matrix) for one in records()])
+
+
+def test_nor_where_rows_are_exchanged_or_where_the_records_are_noise():
+    rows = with_settings([one.mapped(1e5 * np.eye(3)) for one in records()], [0, 1, 4, 3, 2, 5])
+    assert "Check the unit of the force columns" not in said(rows)
+    noise = [one.mapped(1e5 * np.eye(3)) for one in records(noise=20.0, seed=2)]
+    assert "Check the unit of the force columns" not in said(noise)

@@ -22,6 +22,8 @@ FACTORS = (
     100.0,
 )  # steps of an amplifier's ranges, and bits of a converter
 
+COLUMN = "instruments.dynamometer"
+
 
 def gains(sensor: JSON, records: Sequence[Record], designs: Sequence[Design]) -> Iterator[Hypothesis]:
     """Yield the values of one channel multiplied by each factor; ``sensor``: the entry of the manifest."""
@@ -37,7 +39,7 @@ def gains(sensor: JSON, records: Sequence[Record], designs: Sequence[Design]) ->
             yield Hypothesis(
                 "gain",
                 remedy,
-                "instruments.dynamometer",
+                COLUMN,
                 [record.mapped(moved) for record in records],
                 designs,
             )

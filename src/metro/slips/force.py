@@ -18,7 +18,7 @@ from metro.observables.force.model import ForceModel
 from metro.observables.problem import Problem
 from metro.slips import channels, chip_geometry, orientation, run_table
 from metro.slips.hypothesis import Hypothesis
-from metro.slips.physical import against_helix, coefficients_text, impossible, mean_chip
+from metro.slips.physical import against_helix, coefficients_text, impossible, mean_chip, out_of_scale
 from metro.slips.slip import Slip
 from metro.slips.speed import period, repeats_per_revolution, turns_as_declared
 from metro.slips.waveform import Design, Record, WaveFit, design, fit, record_of
@@ -94,6 +94,9 @@ def contradictions(
     better = sorted((one for one in possible if one.fitted.misfit < limit), key=lambda one: one.fitted.misfit)
     if not faults and not better:
         return _upside_down(declared, possible, chip, helix)
+    factor = out_of_scale(declared, chip, helix)
+    if factor is not None and all(one.fitted.misfit > BETTER * declared.misfit for one in tried):
+        return (_of_another_size(declared, faults, factor),)
     least = better[0].fitted.misfit if better else math.nan
     named = [one for one in better if one.fitted.misfit <= ALIKE * least]
     if any(one.hypothesis.kind == END for one in named):
@@ -143,6 +146,19 @@ def _hypotheses(
     yield from chip_geometry.single_directions(cutter, records, designs)
     yield from channels.gains(sensor, records, designs)
     yield from run_table.exchanged(records, designs, declared)
+
+
+def _of_another_size(declared: WaveFit, faults: tuple[str, ...], factor: float) -> Slip:
+    """Return what is to be checked where the waveforms are those of the cuts, and all have another size."""
+    size = f"{factor:.2g} times too large" if factor > 1.0 else f"{1.0 / factor:.2g} times too small"
+    return Slip(
+        OBSERVABLES,
+        f"with the force as declared {'; '.join(faults)}. This is impossible",
+        f"The shape of the force is that of these cuts (waveform error {100 * declared.misfit:.3g} %), but "
+        f"all channels are at least {size}. Check the unit of the force columns (N, kN, mN) and the "
+        "sensitivity of the amplifier",
+        column=channels.COLUMN,
+    )
 
 
 def _slip(declared: WaveFit, faults: tuple[str, ...], named: list[Tried], chip: float) -> Slip:

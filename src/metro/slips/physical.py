@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -65,6 +66,26 @@ def against_helix(fitted: WaveFit, chip: float, helix: float) -> str:
     if by_mean or fitted.misfit > LIKE_THE_MODEL:
         return by_mean
     return _beyond(fitted.wave, -side * axial, "K_ac h + K_ae", axial, wrong)
+
+
+def out_of_scale(fitted: WaveFit, chip: float, helix: float) -> float | None:
+    """Return K_tc over what the materials have, where nothing but the size of the forces is impossible.
+
+    The least factor by which all channels are too large (above 1) or too small; None where K_tc is possible,
+    or where coefficients of any size would be impossible, as with axes that are exchanged.
+    """
+    ktc, (low, high) = float(fitted.mean.value[0]), (limit * N_MM2 for limit in SPECIFIC)
+    if fitted.misfit > LIKE_THE_MODEL or not ktc > 0.0 or low <= ktc <= high:
+        return None
+    scale = math.sqrt(low * high) / ktc
+    usual = replace(fitted, wave=_times(fitted.wave, scale), mean=_times(fitted.mean, scale))
+    if impossible(usual, chip, helix):
+        return None
+    return ktc / (high if ktc > high else low)
+
+
+def _times(coefficients: Coefficients, scale: float) -> Coefficients:
+    return Coefficients(coefficients.value * scale, coefficients.without * scale)
 
 
 def _impossible(coefficients: Coefficients, chip: float, helix: float) -> tuple[str, ...]:
