@@ -45,6 +45,39 @@ def test_coefficients_come_from_the_waveform_where_there_is_one():
     assert rows({"force": {"mean": by_mean}})["shear coefficients"][1].startswith("mean forces")
 
 
+OPEN = made.q(900.0, 1300.0, "N/mm2")
+
+
+@pytest.mark.parametrize(
+    ("sets", "shown"),
+    [
+        (
+            {"waveform": OPEN, "mean": made.q(960.0, 150.0, "N/mm2")},
+            ["waveforms", "mean forces of the ident"],
+        ),
+        (  # the better of two others
+            {
+                "waveform": OPEN,
+                "mean": made.q(960.0, 400.0, "N/mm2"),
+                "mean_all_runs": made.q(950.0, 90.0, "N/mm2"),
+            },
+            ["waveforms", "mean forces of all runs"],
+        ),
+        # no better one, one that is not much better, and a value that is known well enough
+        ({"waveform": OPEN, "mean": made.q(900.0, 1500.0, "N/mm2")}, ["waveforms"]),
+        ({"waveform": OPEN, "mean": made.q(900.0, 700.0, "N/mm2")}, ["waveforms"]),
+        ({"waveform": made.q(900.0, 300.0, "N/mm2"), "mean": made.q(960.0, 50.0, "N/mm2")}, ["waveforms"]),
+        ({"waveform": OPEN}, ["waveforms"]),
+    ],
+)
+def test_where_the_waveform_leaves_the_main_coefficient_open_the_best_other_set_stands_below(sets, shown):
+    force = {name: {"ktc": ktc} for name, ktc in sets.items()}
+    (table,) = key_results(results({"force": force}))
+    sources = [row[2] for row in table.rows if row[0] == "shear coefficients"]
+    assert len(sources) == len(shown)
+    assert all(source.startswith(start) for source, start in zip(sources, shown, strict=True))
+
+
 def test_the_most_flexible_mode_has_the_largest_receptance_and_not_the_least_stiffness():
     soft = mode(50.0, 0.20, 1.0e6)  # 1 / (2 · 0.20 · 1e6) = 2.5e-6 m/N
     damped_less = mode(90.0, 0.01, 4.0e6)  # 1 / (2 · 0.01 · 4e6) = 12.5e-6 m/N

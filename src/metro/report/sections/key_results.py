@@ -42,16 +42,29 @@ def key_results(results: Results) -> list[Item]:
 
 
 def _coefficients(force: JSON) -> Iterator[Row]:
-    """Give the cutting coefficients, shear and edge terms in a line each."""
-    found = next((name for name in FORCE_SETS if force.get(name)), None)
-    if found is None:
+    """Give the cutting coefficients, shear and edge terms in a line each.
+
+    Where the best set leaves the main coefficient open, the set that knows it best stands below.
+    """
+    sets = [name for name in FORCE_SETS if force.get(name)]
+    if not sets:
         return
-    block = force[found]
-    for title, symbols in COEFFICIENTS.items():
-        known = [name for name in symbols if name in block]
-        if known:
-            values = ", ".join(f"{symbols[name]} {quantity(block[name], with_unit=False)}" for name in known)
-            yield title, f"{values} {printed(block[known[0]].get('unit'))}", FORCE_SETS[found]
+    best = min(sets, key=lambda name: _half_interval(force[name]))
+    is_open = _half_interval(force[sets[0]]) > abs(float(force[sets[0]].get("ktc", {}).get("value") or 0.0))
+    better = is_open and _half_interval(force[best]) < 0.5 * _half_interval(force[sets[0]])
+    for name in (sets[0], best) if better else sets[:1]:
+        block = force[name]
+        for title, symbols in COEFFICIENTS.items():
+            known = [symbol for symbol in symbols if symbol in block]
+            if known:
+                values = ", ".join(f"{symbols[one]} {quantity(block[one], with_unit=False)}" for one in known)
+                yield title, f"{values} {printed(block[known[0]].get('unit'))}", FORCE_SETS[name]
+
+
+def _half_interval(block: JSON) -> float:
+    """Half of the 95 % interval of K_tc; infinite where there is none."""
+    interval = (block.get("ktc") or {}).get("ci95")
+    return 0.5 * (float(interval[1]) - float(interval[0])) if interval else math.inf
 
 
 def receptance_peak(mode: JSON) -> float:
