@@ -10,9 +10,9 @@ from scipy.linalg import expm
 from metro.robot.kinematics import Arm, forward, jacobian, link_frames, rotation, transform
 from metro.robot.rigid_body import torque_regressor
 from metro.robot.statics import (
-    flange_jacobian,
     joint_contributions,
     joint_torque,
+    moving_jacobian,
     tip_compliance,
     tip_jacobian,
 )
@@ -105,7 +105,7 @@ def test_poses_jacobians_torques_and_deflections_are_those_of_pinocchio(seed):
             for name in ("flange", "tip")
         ]
         np.testing.assert_allclose(jacobian(arm.dh, angles), at[0], atol=1e-13)
-        np.testing.assert_allclose(flange_jacobian(arm, angles), to_work @ at[0][:3], atol=1e-13)
+        np.testing.assert_allclose(moving_jacobian(arm, angles, 0.0), to_work @ at[0][:3], atol=1e-13)
         np.testing.assert_allclose(tip_jacobian(arm, angles), to_work @ at[1][:3], atol=1e-13)
         force = rng.normal(0, 200, 3)
         wrench = np.r_[arm.work[:3, :3] @ force, np.zeros(3)]

@@ -46,3 +46,21 @@ def test_how_the_weight_changes_along_a_path_is_that_of_the_potential_energy(see
 
 def test_without_idle_runs_nothing_is_known_of_it():
     assert not carried_weight(Refusal("no run has an idle_log"), ARM.dh, np.tile(START, (5, 1))).any()
+
+
+def test_away_from_the_idle_runs_it_is_not_known():
+    """What torques of one path do not determine is anything elsewhere."""
+    turns = np.array([0.1, 0.12, -0.15, 0.2, -0.1, 0.3])
+    found = of_idle_runs(ARM.dh, [idle(np.random.default_rng(1), turns)])
+    near = START + np.linspace(0.1, 0.9, 20)[:, None] * turns
+    assert np.ptp(carried_weight(found, ARM.dh, near)[:, 1]) > 50.0
+    assert not carried_weight(found, ARM.dh, near + np.array([0.0, 0.0, 0.2, 0.0, 0.0, 0.0])).any()
+    leaving = near + np.linspace(0.0, 0.2, 20)[:, None] * np.eye(6)[2]
+    assert not carried_weight(found, ARM.dh, leaving).any()
+
+
+def test_idle_runs_without_torques_show_none():
+    t, q, torque = idle(np.random.default_rng(1), np.array([0.1, 0.12, -0.15, 0.2, -0.1, 0.3]))
+    nothing = np.full_like(torque, np.nan)
+    with pytest.raises(ValueError, match="SVD did not converge"):
+        of_idle_runs(ARM.dh, [(t, q, nothing)])

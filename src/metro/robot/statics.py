@@ -59,11 +59,6 @@ def tip_jacobian_of(arm: Arm, flange: Flange) -> Array:
     return np.asarray(arm.work[:3, :3].T @ in_base)
 
 
-def flange_jacobian(arm: Arm, q: Array) -> Array:
-    """Velocity of the flange's origin in the work frame per joint rate, (..., 3, n): a tip with no lever."""
-    return np.asarray(arm.work[:3, :3].T @ jacobian(arm.dh, q)[..., :3, :])
-
-
 def joint_torque(jacobian_at_tip: Array, force: Array) -> Array:
     """Rise of the motor torques, N m, (..., n), that a force on the tip (..., 3) asks for: τ = −Jᵀ f.
 

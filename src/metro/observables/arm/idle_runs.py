@@ -17,9 +17,10 @@ from metro.robot.kinematics import Geometry, arm_of_cell, prismatic
 from metro.robot.motion import Motion
 from metro.robot.rigid_body import gravity_regressor
 from metro.same import Same
-from metro.units import Array
+from metro.units import DEG, Array
 
 LEAST_SAMPLES = 100
+NEAR = 2.0 * DEG  # of a joint from the idle runs, where the weight is known that these determine
 
 
 @lru_cache(maxsize=1)
@@ -42,13 +43,21 @@ def of_idle_logs(batch: Same[Batch], read: Same[Tables]) -> tuple[Friction, Moti
 def carried_weight(found: tuple[Friction, Motion] | Refusal, dh: Geometry, q: Array) -> Array:
     """Return the torque of the arm's own weight on the link of each joint along a path (m, n), N m.
 
-    Only how it changes along paths like those of the idle runs is known: its level is one with the offset of
-    friction. Zero where no idle run tells of it, and on linear axes, whose drives are not evaluated.
+    Only how it changes along paths near those of the idle runs is known: its level is one with the offset of
+    friction, and elsewhere what these do not determine would count. Zero where no idle run shows it, and on
+    linear axes, whose drives are not evaluated.
     """
-    if isinstance(found, Refusal):
+    if isinstance(found, Refusal) or not _near(found[1].angle, q):
         return np.zeros(q.shape)
     held = gravity_regressor(dh, q) @ found[0].others
     return np.asarray(np.where(prismatic(dh), 0.0, -held))
+
+
+def _near(idle: Array, q: Array) -> bool:
+    """Whether every point of a path (m, n) is near some place of the idle runs (k, n), joint by joint."""
+    from scipy.spatial import KDTree
+
+    return bool((KDTree(idle).query(q, p=np.inf)[0] < NEAR).all())
 
 
 def _torques(log: pd.DataFrame, axes: Axes) -> Array:

@@ -59,7 +59,8 @@ def principal_waves(walls: Sequence[Path], ratios: Array | None = None) -> list[
     list of Array
         with the same c for all walls, greatest component first.
     """
-    covariance = _filtered(_filtered(_covariance(walls, ratios), walls).T, walls)
+    # Two walls at a time: all points of all walls together would be gigabytes for walls of some metres.
+    covariance = np.block([[_covariance(one, other, ratios) for other in walls] for one in walls])
     square, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
     square, vectors = np.maximum(square[::-1], 0.0), vectors[:, ::-1]
     left = np.append(np.cumsum(square[::-1])[::-1], 0.0)
@@ -67,23 +68,19 @@ def principal_waves(walls: Sequence[Path], ratios: Array | None = None) -> list[
     return np.split(components, np.cumsum([len(wall.kept) for wall in walls])[:-1])
 
 
-def _covariance(walls: Sequence[Path], ratios: Array | None) -> Array:
-    """Covariance (m, m) of the heights of all points of all walls, m²; each is zero where it was touched.
+def _covariance(one: Path, other: Path, ratios: Array | None) -> Array:
+    """Covariance (k, l) of the heights of two walls as profiles show them, m².
 
-    The work is touched in the middle of a wall.
+    The work is touched in the middle of a wall, where its height is zero.
     """
-    angles, outwards = (np.vstack([getattr(wall, name) for wall in walls]) for name in ("angles", "outwards"))
-    first = np.cumsum([0, *(len(wall.angles) for wall in walls)])[:-1]
-    touched = np.concatenate(
-        [np.full(len(wall.angles), at + len(wall.angles) // 2) for at, wall in zip(first, walls, strict=True)]
-    )
-    total = np.zeros((len(angles), len(angles)))
-    for joint in range(angles.shape[1]):
-        lag = angles[:, joint, None] - angles[:, joint]
+    total = np.zeros((len(one.angles), len(other.angles)))
+    for joint in range(one.angles.shape[1]):
+        lag = one.angles[:, joint, None] - other.angles[:, joint]
         each = _correlation(lag, None if ratios is None else float(ratios[joint]))
-        each = each - each[touched]
-        total += np.outer(outwards[:, joint], outwards[:, joint]) * (each - each[:, touched])
-    return mean_square() * total
+        each = each - each[len(each) // 2]
+        each = each - each[:, [each.shape[1] // 2]]
+        total += np.outer(one.outwards[:, joint], other.outwards[:, joint]) * each
+    return np.asarray(mean_square() * _filtered(_filtered(total, one).T, other).T)
 
 
 def _correlation(lag: Array, ratio: float | None) -> Array:
@@ -98,12 +95,6 @@ def _correlation(lag: Array, ratio: float | None) -> Array:
     return np.asarray(np.mean([*of_joint, *of_motor], axis=0))
 
 
-def _filtered(heights: Array, walls: Sequence[Path]) -> Array:
-    """Pass columns over the points of all walls through the profiles' filter, and keep what is compared."""
-    ends = np.cumsum([len(wall.angles) for wall in walls])[:-1]
-    return np.vstack(
-        [
-            gaussian_filter(part, wall.spacing, wall.cutoff)[wall.kept]
-            for part, wall in zip(np.split(heights, ends), walls, strict=True)
-        ]
-    )
+def _filtered(heights: Array, wall: Path) -> Array:
+    """Pass columns over the points of a wall through its profile's filter, and keep what is compared."""
+    return np.asarray(gaussian_filter(heights, wall.spacing, wall.cutoff)[wall.kept])

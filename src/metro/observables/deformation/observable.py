@@ -168,7 +168,9 @@ def _of_weight(points: pd.DataFrame) -> list[str]:
     """Say so where the walls are predicted without what the weight of the arm does along them."""
     known = points[axes_of(points).driven(WEIGHT)].to_numpy().any()
     return (
-        [] if known else ["How the arm bends along a wall by its own weight is not known without idle runs."]
+        []
+        if known
+        else ["How the arm bends along a wall by its own weight is not known: no idle run shows it."]
     )
 
 
