@@ -80,6 +80,19 @@ def test_models_differ_by_what_their_predictions_differ(setting, late):
     np.testing.assert_array_equal(same, 0.0)
 
 
+def test_ripples_are_what_a_model_with_the_ripple_predicts_beyond_the_one_without():
+    block, orders, beta = SimpleNamespace(setting=RUN), np.array([7.0, 60.0, 300.0]), np.zeros(36)
+    model = JointForceModel(ARM, drives=DRIVES)
+    (without,) = model.predictions(block, np.zeros((1, 0)), beta)
+    seen = model.ripples(block, 4, orders)
+    for order, wave in zip(orders, seen.T, strict=True):
+        more = replace(DRIVES, ripple=(*DRIVES.ripple, Ripple(4, order, 3.0, -2.0)))
+        (found,) = replace(model, drives=more).predictions(block, np.zeros((1, 0)), beta)
+        expected = 3.0 * wave.imag - 2.0 * wave.real
+        np.testing.assert_allclose(found - without, expected, rtol=1e-9, atol=1e-9)
+        assert np.abs(expected).max() > 0.1
+
+
 def test_a_design_changes_nothing_that_others_are_given():
     block = SimpleNamespace(setting=RUN)
     beta = np.full(len(JointForceModel(ARM).parameters), 0.1)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from test_deformation import Cell, moves
 
+from metro.effects.periodogram import peaks
 from metro.observables.arm.wall import wall
 from metro.observables.problem import BaseFit, Problem
 from metro.observables.waviness import observable as waviness
@@ -52,6 +53,68 @@ def test_a_profile_that_lies_elsewhere_along_the_log_differs_by_the_direction_of
         assert np.linalg.norm(expected) > 0.0
         assert np.linalg.norm(seen - expected) < 1e-6 * np.linalg.norm(expected)
         assert 0.0 < block.zero_sd[0] < 0.2e-3
+
+
+def test_ripples_are_what_a_model_with_the_ripple_predicts_beyond_the_one_without(made):
+    task = soft(made[2])
+    base, orders = task.base, np.array([90.0, 900.0])
+    for block in task.role("identify"):
+        _, without = base.design(block, np.zeros(0))
+        for order, wave in zip(orders, base.ripples(block, 2, orders).T, strict=True):
+            drives = DriveTorques(ripple=(Ripple(2, order, 3.0, -2.0),))
+            _, found = replace(base, drives=drives).design(block, np.zeros(0))
+            expected = 3.0 * wave.imag - 2.0 * wave.real
+            assert np.linalg.norm(found - without - expected) < 1e-9 * np.linalg.norm(expected)
+
+
+@pytest.mark.parametrize("tracked", [0.0, 1.0])
+def test_the_strongest_lines_are_those_of_a_least_squares_fit_line_by_line(made, tracked):
+    """One line of joint 3 is hidden in the walls; the peaks are those that fits of single lines have."""
+    task = soft(made[2], tracked)
+    runs = [block for block in task.blocks if block.role == "identify"]
+    drives = DriveTorques(ripple=(Ripple(2, 420.0, 90.0, 40.0),))
+    hidden = [replace(task.base, drives=drives).design(block, np.zeros(0)) for block in runs]
+    seen = {b.run: m[:, 0] + offset for b, (m, offset) in zip(runs, hidden, strict=True)}
+    blocks = [replace(block, measured=seen.get(block.run, block.measured)) for block in task.blocks]
+    told = replace(task, blocks=tuple(blocks))
+    orders = np.arange(300.0, 600.0, 2.0)
+    found, size = peaks(told, lambda model, block, some: model.ripples(block, 2, some), orders, 3)
+    if not tracked:  # else some of the line is taken for tracking
+        assert found[0] == 420.0
+        assert size[0] == pytest.approx(np.hypot(90.0, 40.0), rel=1e-6)
+    power, amplitude = np.array([alone(told, order) for order in orders]).T
+    tops = [i for i in range(1, len(power) - 1) if power[i - 1] < power[i] >= power[i + 1]]
+    strongest = sorted(tops, key=lambda i: -power[i])[:3]
+    assert found.tolist() == orders[strongest].tolist()
+    np.testing.assert_allclose(size, amplitude[strongest], rtol=1e-6)
+
+
+def soft(problem, tracked=1.0):
+    """Return the problem of an arm whose joints give way, with so much of its tracking error."""
+
+    def gives_way(run):
+        return replace(run, compliance=np.full(6, 1e-6), by_joint=tracked * run.by_joint)
+
+    blocks = (b if b.belief else replace(b, setting=gives_way(b.setting)) for b in problem.blocks)
+    return replace(problem, blocks=tuple(blocks))
+
+
+def alone(problem, order):
+    """Fit one order to what the transfer leaves: return by how much that lowers it, and the amplitude."""
+    base = problem.base
+    known = [block for block in problem.blocks if block.role == "identify" or block.belief]
+    rows = [(base.design(block, np.zeros(0))[0][:, 0], block) for block in known]
+    transfer = sum(row @ (block.measured / block.error**2) for row, block in rows)
+    transfer /= sum(row @ (row / block.error**2) for row, block in rows)
+    columns, target = [], []
+    for row, block in rows:
+        if block.role == "identify":
+            wave = base.ripples(block, 2, np.array([order]))[:, 0]
+            columns.append(np.column_stack([wave.imag, wave.real]) / block.error[:, None])
+            target.append((block.measured - transfer * row) / block.error)
+    scaled, left = np.vstack(columns), np.concatenate(target)
+    best = np.linalg.lstsq(scaled, left, rcond=None)[0]
+    return float(np.sum((scaled @ best) ** 2)), float(np.hypot(*best))
 
 
 def test_the_report_gives_wall_and_prediction_with_intervals(made):

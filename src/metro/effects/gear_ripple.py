@@ -23,13 +23,10 @@ APART = 2.0  # torques of lines that are more than so many times apart are start
 
 
 def _of(joint: int) -> Effect:
-    def added(model: Any, order: float, sine: float, cosine: float) -> Any:
-        ripple = (*model.drives.ripple, Ripple(joint, order, sine, cosine))
-        return replace(model, drives=replace(model.drives, ripple=ripple))
-
     def apply(model: Any, values: Values) -> Any:
         phase, torque = values["phase_deg"] * DEG, values["torque_nm"]
-        return added(model, values["order"], torque * math.cos(phase), torque * math.sin(phase))
+        ripple = Ripple(joint, values["order"], torque * math.cos(phase), torque * math.sin(phase))
+        return replace(model, drives=replace(model.drives, ripple=(*model.drives.ripple, ripple)))
 
     def adapt(effect: Effect, problem: Problem) -> Effect | Refusal:
         """Start from the strongest lines, along the joint's angle, of the base model's residual."""
@@ -38,7 +35,7 @@ def _of(joint: int) -> Effect:
         if not len(orders):
             return Refusal("no joint turns enough in these cuts to show a ripple of its gear")
         lines, size = peaks(
-            problem, lambda m, order, quarter: added(m, order, 1 - quarter, quarter), orders, MOST
+            problem, lambda model, block, some: model.ripples(block, joint, some), orders, MOST
         )
         torque, order, phase = effect.parameters
         step = float(orders[1] - orders[0]) if len(orders) > 1 else order.scale

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from metro.observables.problem import Block, Model, Problem, predictions
-from metro.units import Array
+from metro.observables.problem import Block, Model, Problem
+from metro.units import Array, ComplexArray
+
+AT_ONCE = 128  # frequencies: one product of matrices is quicker than as many with vectors
+
+# ``waves(model, block, frequencies)``: what the model predicts of waves of amplitude 1, one for each of (f,)
+# frequencies, as complex amplitudes (n, f) of e^{iφ}.
+Waves = Callable[[Any, Block, Array], ComplexArray]
 
 
-def peaks(
-    problem: Problem, wave: Callable[[Model, float, float], Model], frequencies: Array, most: int
-) -> tuple[Array, Array]:
+def peaks(problem: Problem, waves: Waves, frequencies: Array, most: int) -> tuple[Array, Array]:
     """Return the frequencies of the strongest waves in the base model's residual, and their amplitudes.
 
     Least squares of a sine and a cosine that all runs of the identification share, frequency after frequency
@@ -21,33 +26,35 @@ def peaks(
 
     Parameters
     ----------
-    wave : ``wave(model, frequency, quarter)`` is the model with a wave of unit amplitude that is ``quarter``
-        of a turn ahead (0 or 1). frequencies : (f,) rising, closer to each other than lines are wide.
-    most : how many peaks to return.
+    frequencies : (f,) rising, closer to each other than lines are wide. most : how many peaks to return.
 
     Returns
     -------
     tuple
         Frequencies and amplitudes (k,), the strongest first, k at most ``most``.
     """
-    blocks = problem.role("identify")
-    residuals, known = _residuals(problem)
-    power, amplitude = np.empty(len(frequencies)), np.empty(len(frequencies))
-    nothing = np.zeros(len(problem.base.parameters))
-    for i, frequency in enumerate(frequencies):
-        models = [wave(problem.base, float(frequency), quarter) for quarter in (0.0, 1.0)]
-        normal, right = np.zeros((2, 2)), np.zeros(2)
-        for block, residual, offset in zip(blocks, residuals, known, strict=True):
-            columns = np.stack([_offset(model, block, nothing) - offset for model in models], axis=1)
-            columns /= block.error[:, None]
-            normal += columns.T @ columns
-            right += columns.T @ residual
-        coefficients = np.linalg.lstsq(normal, right, rcond=1e-9)[0]
-        power[i], amplitude[i] = coefficients @ right, np.linalg.norm(coefficients)
+    normal, right = np.zeros((len(frequencies), 2, 2)), np.zeros((len(frequencies), 2))
+    for block, residual in zip(problem.role("identify"), _residuals(problem), strict=True):
+        for first in range(0, len(frequencies), AT_ONCE):
+            some = slice(first, first + AT_ONCE)
+            seen = waves(problem.base, block, frequencies[some]) / block.error[:, None]
+            added = _normal_equations(seen, residual)
+            normal[some] += added[0]
+            right[some] += added[1]
+    coefficients = _solved(normal, right)
+    power, amplitude = (coefficients * right).sum(axis=1), np.linalg.norm(coefficients, axis=1)
     return _strongest(frequencies, power, amplitude, most)
 
 
-AT_ONCE = 128  # frequencies: one product of matrices is quicker than as many with vectors
+def _normal_equations(seen: ComplexArray, residual: Array) -> tuple[Array, Array]:
+    """Return normal matrices (f, 2, 2) of sine and cosine, and right sides (f, 2), of waves (n, f)."""
+    both = np.stack([seen.imag, seen.real])
+    return np.einsum("inf,jnf->fij", both, both), both.transpose(2, 0, 1) @ residual
+
+
+def _solved(normal: Array, right: Array) -> Array:
+    """Return coefficients (f, 2) of sine and cosine; the smallest where a wave is only one of the two."""
+    return np.asarray(np.einsum("fij,fj->fi", np.linalg.pinv(normal, 1e-9, hermitian=True), right))
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,12 +62,12 @@ class TimeShares:
     """When what makes the elements of a block was cut.
 
     ``time``, ``share`` (m, k): the m places were each cut at k times, each with its share; ``mean`` makes the
-    block's elements (n, c) of values at the places (m, c).
+    block's elements (n, c) of complex heights at the places (m, c).
     """
 
     time: Array
     share: Array
-    mean: Callable[[Array], Array]
+    mean: Callable[[ComplexArray], ComplexArray]
 
 
 def own_peaks(
@@ -77,7 +84,7 @@ def own_peaks(
     """
     blocks = problem.role("identify")
     power, square = np.zeros(len(frequencies)), np.zeros(len(frequencies))
-    for block, left, way in zip(blocks, _residuals(problem)[0], ways, strict=True):
+    for block, left, way in zip(blocks, _residuals(problem), ways, strict=True):
         zeros = np.linalg.qr(block.zeros / block.error[:, None])[0]
         residual = left - zeros @ (zeros.T @ left)
         wave = way.share * np.exp(2j * np.pi * frequencies[0] * way.time)
@@ -89,11 +96,9 @@ def own_peaks(
                 column[:] = wave.sum(axis=1)
                 wave *= on
             seen = way.mean(heights) / block.error[:, None]
-            waves = np.stack([seen.imag, seen.real])
-            waves -= zeros @ (zeros.T @ waves)
-            right = waves.transpose(2, 0, 1) @ residual
-            normal = np.einsum("inf,jnf->fij", waves, waves)
-            coefficients = np.einsum("fij,fj->fi", np.linalg.pinv(normal, 1e-9, hermitian=True), right)
+            seen = seen - zeros @ (zeros.T @ seen)
+            normal, right = _normal_equations(seen, residual)
+            coefficients = _solved(normal, right)
             power[some] += (coefficients * right).sum(axis=1)
             square[some] += (coefficients**2).sum(axis=1)
     return _strongest(frequencies, power, np.sqrt(square / len(blocks)), most, least)
@@ -115,8 +120,8 @@ def middle_start(base: Model, block: Block) -> Array:
     return np.asarray(starts[len(starts) // 2], dtype=float)
 
 
-def _residuals(problem: Problem) -> tuple[list[Array], list[Array]]:
-    """Return the base model's residual of each run, in units of its error, and its offset there.
+def _residuals(problem: Problem) -> list[Array]:
+    """Return the base model's residual of each run, in units of its error.
 
     What is believed of the base parameters holds: else a wave would be taken for a larger one of these.
     """
@@ -130,10 +135,4 @@ def _residuals(problem: Problem) -> tuple[list[Array], list[Array]]:
     )
     beta = np.linalg.lstsq(scaled, target, rcond=None)[0]
     ends = np.cumsum([len(block.measured) for block in blocks])[:-1]
-    count = len(runs)
-    return np.split(target - scaled @ beta, ends)[:count], [offset for _, offset in designs[:count]]
-
-
-def _offset(model: Model, block: Block, beta: Array) -> Array:
-    """Return what a model predicts with base parameters ``beta``, none of the run's own, (n,)."""
-    return np.asarray(predictions(model, block, np.zeros((1, 0)), beta)[0])
+    return np.split(target - scaled @ beta, ends)[: len(runs)]

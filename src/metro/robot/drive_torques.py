@@ -10,7 +10,7 @@ import numpy as np
 
 from metro.robot.by_joint import of_joints, put, raised
 from metro.same import Same
-from metro.units import MRAD, Array
+from metro.units import MRAD, Array, ComplexArray
 
 TURNING = 2e-4  # rad/s: below it a joint is turning round, and its friction is between its two levels
 PRESLIDING = 3e-4  # rad: asperities and grease give way by 0.1 to 1 mrad before a joint slides
@@ -99,11 +99,18 @@ class DriveTorques:
             first = None if start is None else float(start[joint])
             torque[:, joint] += level * _slid(Same(q), Same(rate), int(joint), turns[joint], first)
         for one in self.ripple:
-            angle = one.order * q[:, one.joint]
-            cycles = one.order * rate[:, one.joint] * width / (2.0 * np.pi)
-            mean = one.sine * np.sin(angle) + one.cosine * np.cos(angle)
-            torque[:, one.joint] += np.sinc(cycles) * mean
+            wave = rippling(q[:, one.joint], rate[:, one.joint], width, np.array([one.order]))[:, 0]
+            torque[:, one.joint] += one.sine * wave.imag + one.cosine * wave.real
         return torque
+
+
+def rippling(q: Array, rate: Array, width: Array | float, orders: Array) -> ComplexArray:
+    """Return ripples (m, f) of 1 N m of ``orders`` (f,), as complex amplitudes of a cosine.
+
+    ``q``, ``rate`` (m,) rad and rad/s of the joint; each is the mean over ``width`` s.
+    """
+    cycles = np.outer(rate * width / (2.0 * np.pi), orders)
+    return np.asarray(np.sinc(cycles) * np.exp(1j * np.outer(q, orders)))
 
 
 # A search asks for the friction of one joint along one run again and again, and only its level differs.

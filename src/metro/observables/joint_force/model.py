@@ -22,13 +22,13 @@ from typing import Any
 import numpy as np
 
 from metro.observables.problem import Block, Parameter
-from metro.robot.drive_torques import DriveTorques
+from metro.robot.drive_torques import DriveTorques, rippling
 from metro.robot.kinematics import Arm, Geometry, axes
 from metro.robot.payload import Payload, gravity_torque
 from metro.robot.statics import Flange, flange_of, joint_torque, tip_jacobian_of
 from metro.same import Same
 from metro.signals.waves import waves
-from metro.units import MS, Array
+from metro.units import MS, Array, ComplexArray
 
 AXES = "xyz"
 # What each joint may have otherwise in the cut than in the idle run.
@@ -190,6 +190,14 @@ class JointForceModel:
             if other.arm is not self.arm or other.offset != self.offset:
                 moved[i] += other._asked(run, beta) - self._asked(run, beta)
         return moved, others_own
+
+    def ripples(self, block: Block, joint: int, orders: Array) -> ComplexArray:
+        """Return waves (k m, f) of ripples of 1 N m of a joint's gear: complex amplitudes of a cosine."""
+        run: TorqueRun = block.setting
+        torque = rippling(run.q[:, joint], run.rate[:, joint], run.width, orders)
+        seen = np.zeros((len(self.joints), *torque.shape), complex)
+        seen[self.joints.index(joint)] = waves(torque.view(float)).view(complex)
+        return seen.reshape(-1, len(orders))
 
     def _asked(self, run: TorqueRun, beta: Array) -> Array:
         """Waves (k m,), N m, of the torques that balance the force, with all gains.

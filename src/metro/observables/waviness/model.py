@@ -20,7 +20,7 @@ import numpy as np
 
 from metro.observables.problem import Block, Parameter
 from metro.robot.amplified import AmplifiedRipple, Shape
-from metro.robot.drive_torques import DriveTorques
+from metro.robot.drive_torques import DriveTorques, rippling
 from metro.robot.torsion import Torsion
 from metro.units import Array, ComplexArray
 
@@ -144,12 +144,18 @@ class WavinessModel:
             unseen = unseen - driven(run, self.drives)
         for ripple in self.amplified:
             for times, (sine, cosine) in ripple.multiples:
-                unseen = unseen - ((cosine - 1j * sine) * rippling(run, ripple.shape, times)).real
+                unseen = unseen - ((cosine - 1j * sine) * amplified(run, ripple.shape, times)).real
         for swing, phase in zip(self.vibration, phases_of(self.vibration, nuisance), strict=True):
             if swing.amplitude:
                 turned = np.exp(1j * phase) * swinging(run, swing.frequency)
                 unseen = unseen + swing.amplitude * turned.imag
         return run.tracking[:, None], unseen
+
+    def ripples(self, block: Block, joint: int, orders: Array) -> ComplexArray:
+        """Return waves (n, f), m per N m, of ripples of a joint's gear: complex amplitudes of a cosine."""
+        run: WavyCut = block.setting
+        torque = rippling(run.q[:, joint], run.rate[:, joint], 0.0, orders)
+        return -_filtered(run, (run.moves[:, joint] * run.compliance[joint])[:, None] * torque)
 
 
 # A fit asks for each of these again and again: of what acts on the wall, few numbers change at a time.
@@ -166,22 +172,22 @@ def driven(run: WavyCut, drives: DriveTorques) -> Array:
 
 
 @lru_cache(maxsize=KEPT)
-def rippling(run: WavyCut, shape: Shape, times: int) -> ComplexArray:
+def amplified(run: WavyCut, shape: Shape, times: int) -> ComplexArray:
     """Waves (n,), m per N m, of a ripple of so many times its order, as complex amplitudes of a cosine."""
     torque = shape.following(run.q, run.pace, times)
-    return _filtered(run, run.moves[:, shape.joint] * run.compliance[shape.joint] * torque)
+    height = run.moves[:, shape.joint] * run.compliance[shape.joint] * torque
+    return _filtered(run, height[:, None])[:, 0]
 
 
 @lru_cache(maxsize=KEPT)
 def swinging(run: WavyCut, frequency: float) -> ComplexArray:
     """Waves (n,) of a vibration of amplitude 1, as complex amplitudes of a cosine."""
-    return _filtered(run, np.exp(2j * math.pi * frequency * run.t))
+    return _filtered(run, np.exp(2j * math.pi * frequency * run.t)[:, None])[:, 0]
 
 
 def _filtered(run: WavyCut, height: ComplexArray) -> ComplexArray:
-    """Waves (n,) of complex heights (m,): both parts in one product, else the map becomes complex."""
-    parts = run.filtered @ height.view(float).reshape(-1, 2)
-    return np.asarray(parts.view(complex)[:, 0])
+    """Waves (n, f) of complex heights (m, f): both parts in one product, else the map becomes complex."""
+    return np.asarray((run.filtered @ height.view(float)).view(complex))
 
 
 def _of_twist(run: WavyCut, twist: Array) -> Array:
