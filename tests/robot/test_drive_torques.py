@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from metro.robot.drive_torques import LEAST_TURN, TURNING, DriveTorques, slid
+from metro.robot.drive_torques import LEAST_TURN, TURNING, DriveTorques, Ripple, slid
 
 RATE, T = np.array([[0.2], [-0.1], [0.3]]) * np.ones(6), np.array([0.0, 1.0, 4.0])
 Q = np.array([[0.0], [-0.05], [0.25]]) * np.ones(6)
@@ -66,3 +66,13 @@ def test_friction_that_changes_is_more_where_a_joint_creeps_and_what_is_viscous_
     even, peaked = drives.at(q, rate, t), drives.at(q, rate, t, peak=peak)
     np.testing.assert_allclose(peaked[:, 0], even[:, 0] * peak[:, 0])
     np.testing.assert_array_equal(peaked[:, 1], even[:, 1])
+
+
+def test_a_ripple_is_its_mean_over_the_width_of_a_bin():
+    rate, width, middle = 0.3, 0.5, np.array([0.2, 1.1])
+    ripple = DriveTorques(ripple=(Ripple(0, 40.0, 3.0, -2.0),))
+    found = ripple.at(rate * middle[:, None], np.full((2, 1), rate), middle, width)[:, 0]
+    angle = 40.0 * rate * (middle + width * (np.arange(20_000) + 0.5)[:, None] / 20_000 - width / 2)
+    expected = (3.0 * np.sin(angle) - 2.0 * np.cos(angle)).mean(axis=0)
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
+    assert np.abs(expected).max() < 0.5 * np.hypot(3.0, 2.0)
