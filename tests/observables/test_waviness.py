@@ -83,7 +83,8 @@ def test_the_strongest_lines_are_those_of_a_least_squares_fit_line_by_line(made,
         assert found[0] == 420.0
         assert size[0] == pytest.approx(np.hypot(90.0, 40.0), rel=1e-6)
     power, amplitude = np.array([alone(told, order) for order in orders]).T
-    tops = [i for i in range(1, len(power) - 1) if power[i - 1] < power[i] >= power[i + 1]]
+    around = np.pad(power, 1, constant_values=-np.inf)
+    tops = [i for i in range(len(power)) if around[i] < power[i] >= around[i + 2]]
     strongest = sorted(tops, key=lambda i: -power[i])
     assert found.tolist() == orders[strongest].tolist()
     np.testing.assert_allclose(size, amplitude[strongest], rtol=1e-6)
