@@ -76,7 +76,7 @@ EFFECT = Effect(
     name="amplifier_filter",
     observables=("force",),
     parameters=(
-        EffectParameter("corner_hz", "Hz", LOWEST, OPEN, 30.0, starts=STARTS, neutral=OPEN),
+        EffectParameter("corner_hz", "Hz", LOWEST, OPEN, 30.0, starts=STARTS, neutral=OPEN, reciprocal=True),
         EffectParameter(
             "order",
             "1",

@@ -28,7 +28,15 @@ def _channel(number: int) -> tuple[EffectParameter, EffectParameter]:
     damping = EffectParameter("damping", "1", 0.002, 0.2, 0.01, starts=(0.04,), group=number, neutral=0.04)
     return (
         EffectParameter(
-            "frequency_hz", "Hz", LOWEST, RIGID, 30.0, starts=STARTS, group=number, neutral=RIGID
+            "frequency_hz",
+            "Hz",
+            LOWEST,
+            RIGID,
+            30.0,
+            starts=STARTS,
+            group=number,
+            neutral=RIGID,
+            reciprocal=True,
         ),
         replace(damping, nothing_below=True, decisive=True),
     )

@@ -162,14 +162,16 @@ def _fitted(
             state = State(predicting(candidate, blocks, given, beta, len(known)), beta.copy(), {})
             trials.append((search_nuisance(candidate, blocks, noise, state, around), state))
         best = _distinct(sorted(trials, key=lambda trial: trial[0]), ALIKE * trials[0][0])
+    nothing = cost_under(start, noise) if start and fresh else np.inf  # what the simpler candidate costs
     if start and fresh:
         followed = best if len(fresh) == 1 else best[: _followed(candidate)]
         first = _lowest_first(candidate, blocks, noise, followed, steps=FIRST_STEPS, bound=bound, known=start)
         best = _distinct(first, SAME)
         if noise_room.within_budget(blocks, noise):
             best = best[:KEPT]
-            if cost_under(start, noise) - first[0][0] < HOPELESS * len(fresh):
+            if nothing - first[0][0] < HOPELESS * len(fresh):
                 return _refined(candidate, blocks, prior, noise, best[0], rounds=0)
+    bound = min(bound, nothing)  # above it all was in vain: neutral values are where such a descent leads
     reached = _lowest_first(candidate, blocks, noise, best, steps=ITERATIONS, bound=bound, known=start)
     if reached[0][0] > bound:
         state = reached[0][1]
