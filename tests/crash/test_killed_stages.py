@@ -11,7 +11,7 @@ from stage_runs import PROCESSED, STAGES, Undisturbed, killed_at_event, killed_w
 from metro.batch.at_work import remove_leftovers
 
 # Every so many changes to files a kill, in the ordinary tests; the exhaustive ones kill at each of them.
-STEP = {"ingest": 9, "identify": 37, "predict": 2, "loop": 5, "verdict": 5, "report": 5, "campaign": 5}
+STEP = {"ingest": 14, "identify": 53, "predict": 2, "loop": 5, "verdict": 5, "report": 5, "campaign": 5}
 
 
 def survives(undisturbed, stage, folder, kill):
@@ -66,13 +66,14 @@ def test_a_stage_killed_in_the_middle_of_a_file(undisturbed, stage, size, tmp_pa
     assert survives(undisturbed, stage, tmp_path / "work", kill)
 
 
-def test_what_describes_a_batch_is_never_beside_tables_of_another_ingest(undisturbed, tmp_path):
+@pytest.mark.parametrize("step", [9, pytest.param(1, marks=pytest.mark.slow)])
+def test_what_describes_a_batch_is_never_beside_tables_of_another_ingest(undisturbed, step, tmp_path):
     was = Undisturbed(tmp_path / "was", value=90.0, title="As it was")
     old, new = was.after["ingest"], undisturbed.after["ingest"]
     changed = {name for name in new if old[name] != new[name]}
     assert len(changed) >= 3
     assert str(PROCESSED / "batch.json") in changed
-    for number in range(1, 120, 3):
+    for number in range(1, 120, step):
         folder = tmp_path / str(number)
         shutil.copytree(was.before["identify"], folder)
         shutil.copytree(undisturbed.before["ingest"], folder, dirs_exist_ok=True)

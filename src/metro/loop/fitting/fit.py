@@ -12,6 +12,7 @@ from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import chdtri
 
 from metro.loop.fitting import noise as noise_room
 from metro.loop.fitting.candidate import Candidate, predicting, started
@@ -166,11 +167,17 @@ def _fitted(
     if start and fresh:
         followed = best if len(fresh) == 1 else best[: _followed(candidate)]
         first = _lowest_first(candidate, blocks, noise, followed, steps=FIRST_STEPS, bound=bound, known=start)
-        best = _distinct(first, SAME)
+        best, chance = _distinct(first, SAME), _by_chance(candidate, len(fresh))
         if noise_room.within_budget(blocks, noise):
             best = best[:KEPT]
-            if nothing - first[0][0] < HOPELESS * len(fresh):
+            if nothing - first[0][0] < chance:
                 return _refined(candidate, blocks, prior, noise, best[0], rounds=0)
+        elif first[0][0] < nothing:
+            # What is missed makes the noise large: whether this gains anything is seen under its own.
+            own = _reestimated(candidate, blocks, prior, noise, best[0])
+            reached_first = _refined(candidate, blocks, prior, own, best[0], rounds=0)
+            if 2.0 * (reached_first.total - start.total) < chance:
+                return reached_first
     bound = min(bound, nothing)  # above it all was in vain: neutral values are where such a descent leads
     reached = _lowest_first(candidate, blocks, noise, best, steps=ITERATIONS, bound=bound, known=start)
     if reached[0][0] > bound:
@@ -181,6 +188,15 @@ def _fitted(
     refine = partial(_refined, candidate, blocks, prior, noise, rounds=ROUNDS, least=race.least)
     refined = [refine(state) for state in near]
     return max(refined, key=lambda fitted: fitted.total)
+
+
+def _by_chance(candidate: Candidate, count: int) -> float:
+    """Return what ``count`` parameters gain by chance in twice the log-likelihood where nothing is hidden.
+
+    It is the mean; of an effect that was sought in many places, what one of them gains more often than not.
+    """
+    sought = candidate.effects[-1].sought
+    return max(HOPELESS * count, float(chdtri(count, 1.0 / sought)))
 
 
 def _followed(candidate: Candidate) -> int:
