@@ -20,11 +20,7 @@ from metro.loop.fitting.descent import HOPE, ITERATIONS, descend, polish
 from metro.loop.fitting.end import CONVERGED, End, end_of
 from metro.loop.fitting.noise import Noise
 from metro.loop.fitting.nuisances import costs, first_beta, search_nuisance
-from metro.loop.fitting.system import (
-    State,
-    effect_slopes,
-    linearised,
-)
+from metro.loop.fitting.system import State, effect_slopes, linearised
 from metro.observables.problem import Block
 from metro.units import Array
 
@@ -165,7 +161,8 @@ def _fitted(
         best = _distinct(sorted(trials, key=lambda trial: trial[0]), ALIKE * trials[0][0])
     nothing = cost_under(start, noise) if start and fresh else np.inf  # what the simpler candidate costs
     if start and fresh:
-        followed = best if len(fresh) == 1 else best[: _followed(candidate)]
+        most = OF_A_LIKENESS if candidate.effects[-1].resembled else FOLLOWED
+        followed = best if len(fresh) == 1 else best[:most]
         first = _lowest_first(candidate, blocks, noise, followed, steps=FIRST_STEPS, bound=bound, known=start)
         best, chance = _distinct(first, SAME), _by_chance(candidate, len(fresh))
         if noise_room.within_budget(blocks, noise):
@@ -197,10 +194,6 @@ def _by_chance(candidate: Candidate, count: int) -> float:
     """
     sought = candidate.effects[-1].sought
     return max(HOPELESS * count, float(chdtri(count, 1.0 / sought)))
-
-
-def _followed(candidate: Candidate) -> int:
-    return OF_A_LIKENESS if candidate.effects[-1].resembled else FOLLOWED
 
 
 def _distinct(reached: Sequence[tuple[float, State]], apart: float) -> list[State]:
