@@ -169,7 +169,7 @@ def _fitted(
             best = best[:KEPT]
             if nothing - first[0][0] < chance:
                 return _refined(candidate, blocks, prior, noise, best[0], rounds=0)
-        elif first[0][0] < nothing:
+        elif first[0][0] < nothing + UNDECIDED:
             # What is missed makes the noise large: whether this gains anything is seen under its own.
             own = _reestimated(candidate, blocks, prior, noise, best[0])
             reached_first = _refined(candidate, blocks, prior, own, best[0], rounds=0)
