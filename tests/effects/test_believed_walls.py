@@ -71,6 +71,54 @@ def test_the_zero_of_all_walls_moves_each_as_a_whole(wall):
     np.testing.assert_allclose(height(wall, wall_zero=5e-6) - height(wall), 5e-6)
 
 
+SHARE, CUBIC = 0.12, 6e14
+
+
+def in_series(torque):
+    """Joint 1 hardens, its link does not: the two springs carry one torque."""
+    twist = torque * COMPLIANCE
+    soft = 2.5 * COMPLIANCE[0]  # a gear that hardens is softer at small torques
+    twist[0] = SHARE * soft * torque[0] + elastic_arm.twisted(torque[0], 1 / ((1 - SHARE) * soft), CUBIC)
+    return twist
+
+
+def all_hardens(monkeypatch):
+    """Let no joint have a link: what metro took for known before."""
+    monkeypatch.setattr("metro.observables.deformation.blocks.LINKS", 0.0)
+    monkeypatch.setattr("metro.observables.deformation.blocks.OF_LINKS", 1e-6)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_link_in_series_with_a_gear_that_hardens_makes_the_hardening_no_smaller(known, monkeypatch):
+    if not known:
+        all_hardens(monkeypatch)
+    outcome = search(problem({"springs": in_series}, 3), stiffness_hardening.EFFECT, GATES)
+    assert outcome.names == ("stiffness_hardening",)
+    assert outcome.final.candidate.effects[0].form == "joint 1"
+    (cubic,), sd = outcome.final.theta, np.sqrt(outcome.final.covariance[-1, -1])
+    if known:
+        assert abs(cubic - CUBIC) < 2.0 * sd < 0.5 * CUBIC
+    else:
+        assert cubic < 0.6 * CUBIC
+
+
+def test_the_wall_depends_on_what_stays_straight_as_its_design_says(wall):
+    hard = replace(SHARING, torsion=SHARING.torsion.with_joint(0, cubic=CUBIC).with_joint(1, cubic=CUBIC))
+    tests = problem({}, 0).role("calibrate")[1]
+    for block in (wall, tests):
+        beta = np.concatenate([COMPLIANCE, np.full(len(SHARING.believed), 0.1)])
+        matrix, _ = hard.design(block, np.zeros(0), beta)
+        for name in ("straight_joint_1", "straight_joint_2", "joint_compliance_1"):
+            place = NAMES.index(name)
+            step = 1e-4 * beta[place]
+            about = [beta + sign * step * np.eye(len(beta))[place] for sign in (1.0, -1.0)]
+            above, below = (m @ b + o for b in about for m, o in [hard.design(block, np.zeros(0), b)])
+            expected = (above - below) / (2.0 * step)
+            size = np.abs(expected).max()
+            np.testing.assert_allclose(matrix[:, place], expected, atol=1e-4 * size)
+            assert size > 0.0
+
+
 def of_gears(seed):
     """Walls and load tests of an arm with gears of the virtual world, and what both models say of them."""
     rng = np.random.default_rng(seed)
@@ -85,12 +133,17 @@ def of_gears(seed):
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])
-def test_gears_in_three_pieces_harden_no_joint(seed):
-    """Springs that are a fifth softer below a tenth of the rated torque are what gears are."""
-    without, with_lost_motion = of_gears(seed)
+def test_gears_in_three_pieces_harden_no_joint(seed, monkeypatch):
+    """Springs that are a fifth softer below a tenth of the rated torque are what gears are.
+
+    Without lost motion, and where all of a joint is taken to harden, one of them would be a hardening.
+    """
+    _, with_lost_motion = of_gears(seed)
     effects = (*stiffness_hardening.EFFECT, *stiffness_scale.EFFECT, *joint_backlash.EFFECT)
     assert search(with_lost_motion, effects, GATES).names == ()
     if seed == 1:
+        all_hardens(monkeypatch)
+        without, _ = of_gears(seed)
         assert search(without, effects, GATES).names != ()
 
 

@@ -19,7 +19,16 @@ from metro.loop.fitting.held_out import identified_fit
 from metro.observables.arm import tip_force
 from metro.observables.arm.wall import wall
 from metro.observables.deformation import observable as deformation
-from metro.observables.deformation.blocks import LOADED, SOFTER, TOUCHED, TWISTED, ZERO, with_zeros
+from metro.observables.deformation.blocks import (
+    LINKS,
+    LOADED,
+    OF_LINKS,
+    SOFTER,
+    TOUCHED,
+    TWISTED,
+    ZERO,
+    with_zeros,
+)
 from metro.observables.deformation.setting import CutWall
 from metro.observables.problem import BaseFit, Problem, Refusal
 from metro.robot.kinematics import arm_of_cell, link_frames
@@ -331,7 +340,10 @@ def test_without_an_idle_run_the_force_comes_from_the_coefficients_and_the_notes
         "wall_zero": TOUCHED,
         **{f"force_off_coefficients_{axis}": pytest.approx(off) for axis in "xyz"},
         **{f"gear_wave_{wave + 1}": 1.0 for wave in range(task.base.waves)},
+        **{f"straight_joint_{joint}": OF_LINKS for joint in range(1, 7)},
     }
+    straight = [name.startswith("straight_joint") for name in believed.axis]
+    np.testing.assert_array_equal(believed.measured, np.where(straight, LINKS, 0.0))
     assert task.base.waves > 0
 
 

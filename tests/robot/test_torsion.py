@@ -64,15 +64,15 @@ def test_a_gap_is_passed_where_the_torque_overcomes_the_drag_and_hardly_where_it
     assert share[0] < 0.2
     assert 0.5 < share[1] < 0.9
     np.testing.assert_allclose(share[2:], [1.0, -1.0], rtol=1e-3)
-    twist, _ = Torsion().with_joint(0, gap=2.0, drag=20.0).in_cut(torque, np.zeros(1))
-    np.testing.assert_allclose(twist[:, 0], share)
+    twist = Torsion().with_joint(0, gap=2.0, drag=20.0).in_cut(torque, np.zeros(1))
+    np.testing.assert_allclose(twist.angle[:, 0], share)
 
 
 def test_gap_and_factor_act_in_the_cut_alone_and_hardening_in_both():
     torque = np.tile([300.0, -200.0, 150.0, -60.0, 50.0, 40.0], (4, 1))
     odd = Torsion().with_joint(1, gap=1e-4).with_joint(1, factor=0.5).with_joint(4, cubic=5e11)
-    rest, _ = odd.at_rest(torque, 1 / STIFFNESS)
-    cut, _ = odd.in_cut(torque, 1 / STIFFNESS)
+    rest = odd.at_rest(torque, 1 / STIFFNESS).angle
+    cut = odd.in_cut(torque, 1 / STIFFNESS).angle
     linear = torque / STIFFNESS
     np.testing.assert_allclose(np.delete(rest, 4, axis=1), np.delete(linear, 4, axis=1))
     assert (rest[:, 4] < 0.99 * linear[:, 4]).all()
@@ -88,3 +88,29 @@ def test_what_is_told_twice_of_a_joint_adds_up():
     assert twice.factor[2] == pytest.approx(0.4)
     assert twice.gap[:2] == (0.0, 0.0)
     assert not any(twice.cubic)
+
+
+def test_what_stays_straight_is_a_spring_in_series_with_the_one_that_hardens():
+    """Both carry the whole torque: 30 % of the compliance as it is, the rest by the root finder."""
+    torque, c, cubic = np.linspace(-900.0, 900.0, 7)[:, None], 1e-6, 4e14
+    hard = Torsion().with_joint(0, cubic=cubic)
+    found = hard.at_rest(torque, np.array([c]), np.array([0.3])).angle[:, 0]
+    alone = [
+        brentq(lambda x, t=t: x / (0.7 * c) + cubic * x**3 - t, -1e-2, 1e-2, xtol=1e-18) for t in torque[:, 0]
+    ]
+    np.testing.assert_allclose(found, 0.3 * c * torque[:, 0] + alone, rtol=1e-9, atol=1e-15)
+    assert abs(found[-1]) > 1.2 * abs(hard.at_rest(torque, np.array([c])).angle[-1, 0])
+
+
+def test_the_slopes_of_springs_in_series_are_their_derivatives():
+    torque, c, s = np.array([[-700.0, 30.0], [200.0, 900.0]]), np.array([1e-6, 3e-6]), np.array([0.2, 0.4])
+    hard = Torsion((), (), (4e14, 1e13), (0.8,))
+
+    def angle(c, s):
+        return hard.in_cut(torque, c, s).angle
+
+    found = hard.in_cut(torque, c, s)
+    by_c = (angle(c * 1.0001, s) - angle(c * 0.9999, s)) / (2e-4 * c)
+    by_s = (angle(c, s + 1e-5) - angle(c, s - 1e-5)) / 2e-5
+    np.testing.assert_allclose(found.by_compliance * [1.0, 1.0], by_c, rtol=1e-5)
+    np.testing.assert_allclose(found.by_straight, by_s, rtol=1e-5)

@@ -14,6 +14,7 @@ from metro.wording.names import BELIEFS, belief
         ("at_once_z_B2", "share of the compliance that follows a force along z at once, at pose B2"),
         ("force_off_dyno_z", "force by the dyno, along z and relative to its size"),
         ("softer_joint_3", "compliance of joint 3 in the cut, against the load tests"),
+        ("straight_joint_1", "share of the compliance of joint 1 that does not harden"),
         ("drag_of_a_hose", "drag of a hose"),
     ],
 )

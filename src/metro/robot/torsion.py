@@ -1,13 +1,14 @@
 """How far the joints of an arm twist under a torque: springs that may harden, and a gap between gear teeth.
 
 A joint's spring obeys T = k x + cubic x³ (stiffer the further it is twisted, as flexsplines and preloaded
-bearings are); on top of it the joint passes half of its gap towards the side that the torque pushes it to,
-where that overcomes the drag beyond the gap.
+bearings are), in series with what stays straight (its link, its seat). On top of it the joint passes half of
+its gap towards the side that the torque pushes it to, where that overcomes the drag beyond the gap.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,14 @@ from metro.robot.by_joint import of_joints, put, raised, scaled
 from metro.units import Array
 
 TURNING = 0.02  # of the largest torque: below it a joint is between the two ends of its gap
+
+
+class Twist(NamedTuple):
+    """Twist of joints, (..., n) rad, and its slopes by their compliances, N m, and straight shares, rad."""
+
+    angle: Array
+    by_compliance: Array
+    by_straight: Array
 
 
 @dataclass(frozen=True)
@@ -51,15 +60,16 @@ class Torsion:
             factor=scaled(self.factor, joint, factor),
         )
 
-    def in_cut(self, torque: Array, compliance: Array) -> tuple[Array, Array]:
-        """Torsion (..., n), rad, in the cut, and its derivative by the compliances, N m.
+    def in_cut(self, torque: Array, compliance: Array, straight: Array | float = 0.0) -> Twist:
+        """Twist in the cut.
 
         Parameters
         ----------
         torque : (m, n) on the links, N m, along one cut. compliance : (n,) of static loads, rad/(N m).
+        straight : (n,) share of it that does not harden.
         """
-        twist, slope = self.at_rest(torque / self.factors(torque.shape[-1]), compliance)
-        return twist + self.passed(torque), slope
+        twist = self.at_rest(torque / self.factors(torque.shape[-1]), compliance, straight)
+        return twist._replace(angle=twist.angle + self.passed(torque))
 
     def passed(self, torque: Array) -> Array:
         """How much of its gap each joint has passed under torques (m, n), N m, along one cut: (m, n) rad."""
@@ -70,13 +80,19 @@ class Torsion:
         """Stiffness in the cut relative to static loads, of ``count`` joints, (n,)."""
         return of_joints(self.factor, count, 1.0)
 
-    def at_rest(self, torque: Array, compliance: Array) -> tuple[Array, Array]:
-        """Torsion (..., n), rad, under static loads, and its derivative by the compliances, N m."""
+    def at_rest(self, torque: Array, compliance: Array, straight: Array | float = 0.0) -> Twist:
+        """Twist under static loads (..., n), N m."""
         if not any(self.cubic):
-            return torque * compliance, torque
+            return Twist(torque * compliance, torque, np.zeros_like(torque))
         cubic = of_joints(self.cubic, torque.shape[-1])
-        twist = spring(torque, compliance, cubic)
-        return twist, spring_slope(torque, twist, compliance, cubic)
+        hardening = (1.0 - straight) * compliance
+        twist = spring(torque, hardening, cubic)
+        slope = spring_slope(torque, twist, hardening, cubic)
+        return Twist(
+            twist + straight * compliance * torque,
+            (1.0 - straight) * slope + straight * torque,
+            compliance * (torque - slope),
+        )
 
 
 def spring(torque: Array, compliance: Array, cubic: Array) -> Array:

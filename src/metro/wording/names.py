@@ -12,6 +12,7 @@ SURE = 0.95  # probability from which on a cause counts as identified
 BELIEFS = {
     r"softer_joint_(\d)": "compliance of joint {} in the cut, against the load tests",
     r"lost_motion_joint_(\d)": "lost motion of joint {} in the load tests, of its twist there",
+    r"straight_joint_(\d)": "share of the compliance of joint {} that does not harden",
     r"wall_zero": "zero of all walls",
     r"gear_wave_(\d+)": "wave {} of the errors of the gears along the walls, over what is usual",
     r"force_off": "force",

@@ -18,7 +18,14 @@ from metro.observables.arm.wall import wall
 from metro.observables.arm.wall_profile import SPACING, WEIGHT
 from metro.observables.cut.conditions import feed
 from metro.observables.deformation.gear_waves import Path, principal_waves
-from metro.observables.deformation.model import AXES, GEAR_WAVE, LOST_MOTION, WALL_ZERO, DeformationModel
+from metro.observables.deformation.model import (
+    AXES,
+    GEAR_WAVE,
+    LOST_MOTION,
+    STRAIGHT,
+    WALL_ZERO,
+    DeformationModel,
+)
 from metro.observables.deformation.setting import CutWall, KnownParameters
 from metro.observables.problem import Block
 from metro.units import ARCSEC, MM, UM, Array
@@ -34,6 +41,10 @@ SOFTER = 0.05
 # Of a joint's twist under its largest load: the lost motion, and what is softer below a tenth of the rated
 # torque. By the same figures it is 1 to 8 %.
 TWISTED = 0.04
+# Share of a joint's compliance that stays straight where its gear hardens, and how far it may be off: links
+# and base make 20 to 50 % of the compliance of an arm (Klimchik et al. 2015, Abele et al. 2007), and half of
+# that of its joints at small torques, where a gear that hardens is softer.
+LINKS, OF_LINKS = 0.2, 0.1
 TOUCHED = 10 * UM  # of the zero that all walls share: the touch on the work, and the tool's radius
 ZERO = 5 * UM  # standard error of a profile's zero against the programmed wall, before repeats show theirs
 DECLARED = 4  # walls for which that counts
@@ -211,13 +222,14 @@ def believed_block(model: DeformationModel) -> Block:
     force = {f"force_off_{source}_{axis}": off[source] for source in model.forces for axis in AXES}
     lost = {f"{LOST_MOTION}{joint + 1}": TWISTED for joint in range(len(model.loaded))}
     waves = {f"{GEAR_WAVE}{wave + 1}": 1.0 for wave in range(model.waves)}
-    known = force | lost | waves | {WALL_ZERO: TOUCHED}
+    straight = {f"{STRAIGHT}{joint + 1}": LINKS for joint in range(len(model.springs))}
+    known = force | lost | waves | dict.fromkeys(straight, OF_LINKS) | {WALL_ZERO: TOUCHED}
     sigma = [known.get(one.name, SOFTER) for one in model.believed]
-    count = len(sigma)
+    count, value = len(sigma), np.array([straight.get(one.name, 0.0) for one in model.believed])
     places = len(model.parameters) - count + np.arange(count)
     names, zeros, none = np.array([one.name for one in model.believed]), np.zeros((count, 0)), np.zeros(0)
     return Block(
-        *("believed", "believed", "calibrate", 0, np.zeros(count), np.array(sigma)),
+        *("believed", "believed", "calibrate", 0, value, np.array(sigma)),
         *(KnownParameters(places), names, zeros, none, {}),
         belief=True,
     )

@@ -28,6 +28,7 @@ from metro.units import UM, Array
 WALL_ZERO = "wall_zero"
 LOST_MOTION = "lost_motion_joint_"
 GEAR_WAVE = "gear_wave_"
+STRAIGHT = "straight_joint_"
 PASSED = 0.2  # of a joint's largest load: where its lost motion is passed
 AXES = "xyz"
 
@@ -76,23 +77,25 @@ class DeformationModel:
 
     @property
     def believed(self) -> tuple[Parameter, ...]:
-        """By how much each joint is softer in the cut, its lost motion, and common errors.
+        """By how much each joint is softer in the cut, its lost motion, common errors, what does not harden.
 
         The lost motion is relative to the joint's twist under the largest load. Common are the zero of all
         walls, errors of the force relative to its size, for each of its sources along the work axes, and the
-        waves of the gears.
+        waves of the gears. Where a joint hardens, its link and its seat do not: a share of its compliance.
         """
         softer = [Parameter(f"softer_joint_{i + 1}", "%", 0.01) for i in range(len(self.springs))]
         lost = [Parameter(f"{LOST_MOTION}{i + 1}", "%", 0.01) for i in range(len(self.loaded))]
         zero = [Parameter(WALL_ZERO, "um", UM)] if self.touched else []
         force = itertools.product(self.forces, AXES)
         waves = (Parameter(f"{GEAR_WAVE}{i + 1}", "1") for i in range(self.waves))
+        straight = (Parameter(f"{STRAIGHT}{i + 1}", "%", 0.01) for i in range(len(self.springs)))
         return (
             *softer,
             *lost,
             *zero,
             *(Parameter(f"force_off_{source}_{axis}", "%", 0.01) for source, axis in force),
             *waves,
+            *straight,
         )
 
     def compliance(self, beta: Array) -> Array:
@@ -103,6 +106,11 @@ class DeformationModel:
         """Return the compliances of the joints in the cut, (n,), by the base parameters."""
         count = len(self.springs)
         return self.compliance(beta) + (np.array(self.springs) * beta[count : 2 * count] if count else 0.0)
+
+    def straight(self, beta: Array) -> Array:
+        """Return the share of each joint's compliance that does not harden, (n,), by the base parameters."""
+        count = len(self.springs)
+        return beta[len(beta) - count :] if count else np.zeros(len(self.arm.dh))
 
     @property
     def joints(self) -> tuple[int, ...]:
@@ -118,15 +126,16 @@ class DeformationModel:
         setting: Any = block.setting
         about = np.zeros(len(self.parameters)) if beta is None else beta
         if isinstance(setting, CutWall):
-            matrix, offset = self._cut(setting, self.in_cut(about))
+            matrix, straight, offset = self._cut(setting, self.in_cut(about), self.straight(about))
             offset = offset + block.order * float(setting.normal[:2] @ np.array(self.drift))
             softer = [matrix * np.array(self.springs)] if self.springs else []
-            return np.hstack([matrix, *softer, self._lost_in_cut(setting), self._off(setting)]), offset
+            common = self._lost_in_cut(setting), self._off(setting)
+            return np.hstack([matrix, *softer, *common, straight]), offset
         if isinstance(setting, LoadTest):
-            matrix, offset = self._loaded(setting, self.compliance(about))
-            softer = [np.zeros((len(matrix), len(self.springs))), self._lost_in_test(setting)]
-            common = len(self.parameters) - sum(part.shape[1] for part in (matrix, *softer))
-            return np.hstack([matrix, *softer, np.zeros((len(matrix), common))]), offset
+            matrix, straight, offset = self._loaded(setting, self.compliance(about), self.straight(about))
+            own = matrix, np.zeros((len(matrix), len(self.springs))), self._lost_in_test(setting)
+            common = len(self.parameters) - sum(part.shape[1] for part in (*own, straight))
+            return np.hstack([*own, np.zeros((len(matrix), common)), straight]), offset
         rows = np.eye(len(self.parameters))[setting.places]
         return rows, np.zeros(len(rows))
 
@@ -184,15 +193,16 @@ class DeformationModel:
         moved = moving_jacobian(self.arm, joints, self.flange_rotation)
         return moved * self.torques(joints, force)[..., None, :]
 
-    def deflection(self, setting: CutWall, compliance: Array) -> Array:
-        """Deflection of the tip in the cut, (m, 3) m, work frame, for joint compliances (n,)."""
+    def deflection(self, setting: CutWall, beta: Array) -> Array:
+        """Deflection of the tip in the cut, (m, 3) m, work frame, by the base parameters."""
         moved, _ = static(self.arm, self.flange_rotation, setting)
-        return np.asarray(np.einsum("mai,mi->ma", moved, self.twists(setting, compliance)))
+        return np.asarray(np.einsum("mai,mi->ma", moved, self.twists(setting, beta)))
 
-    def twists(self, setting: CutWall, compliance: Array) -> Array:
-        """Twist of the joints in the cut, (m, n) rad."""
+    def twists(self, setting: CutWall, beta: Array) -> Array:
+        """Twist of the joints in the cut, (m, n) rad, by the base parameters."""
         _, torque = static(self.arm, self.flange_rotation, setting)
-        return self.torsion.in_cut(self.structure.in_cut(torque), compliance)[0]
+        given = self.in_cut(beta), self.straight(beta)
+        return self.torsion.in_cut(self.structure.in_cut(torque), *given).angle
 
     def per_newton(self, setting: CutWall, compliance: Array) -> Array:
         """Height by which the wall is proud per additional newton in x, y and z at the tool, (n, 3) m/N.
@@ -243,29 +253,35 @@ class DeformationModel:
         torques = [static(self.arm, self.flange_rotation, wall)[1] for wall in walls]
         return np.asarray(np.abs(np.vstack(torques)).max(axis=0, initial=0.0))
 
-    def _cut(self, setting: CutWall, compliance: Array) -> tuple[Array, Array]:
+    def _cut(self, setting: CutWall, compliance: Array, straight: Array) -> tuple[Array, Array, Array]:
+        """Return what a wall gains per compliance and per straight share of the springs, and without, m."""
         out, torque = outwards(self.arm, self.flange_rotation, setting)
-        twist, slope = self.torsion.in_cut(self.structure.in_cut(torque), compliance)
+        angle, slope, bent = self.torsion.in_cut(self.structure.in_cut(torque), compliance, straight)
         held = self._held(setting) - (
             0.0 if setting.weight is None else self.structure.in_cut(setting.weight)
         )
-        twist, slope = twist - held * compliance, slope - held
+        angle, slope = angle - held * compliance, slope - held
         # The prediction passes the same filter as the profile, because that matters at the entry.
         smooth = profile_filter(len(out), setting.spacing, setting.cutoff)[setting.kept]
-        constant = (out * (twist - slope * compliance)).sum(axis=1) + strayed(self.arm, setting)
+        rest = angle - slope * compliance - bent * straight
+        constant = (out * rest).sum(axis=1) + strayed(self.arm, setting)
         constant = constant + self.give * (setting.force @ setting.normal)
-        return smooth @ (out * slope), smooth @ constant
+        hardening = smooth @ (out * bent)[:, : len(self.springs)]
+        return smooth @ (out * slope), hardening, smooth @ constant
 
     def _held(self, setting: CutWall) -> Array:
         """Torque (m, n), N m, that friction keeps off the springs in the cut, at load-test stiffness."""
         friction = self.drives.at(setting.commanded, setting.rate, np.zeros(len(setting.rate)))
         return np.asarray(self.structure.in_cut(friction) / self.torsion.factors(friction.shape[1]))
 
-    def _loaded(self, setting: LoadTest, compliance: Array) -> tuple[Array, Array]:
+    def _loaded(self, setting: LoadTest, compliance: Array, straight: Array) -> tuple[Array, Array, Array]:
+        """Return what load tests gain per compliance and per straight share, and without, m."""
         moved, torque = static(self.arm, self.flange_rotation, setting)
-        twist, slope = self.torsion.at_rest(torque, compliance)
-        constant = np.einsum("mai,mi->ma", moved, twist - slope * compliance)
-        return (moved * slope[:, None, :])[setting.measured], constant[setting.measured]
+        angle, slope, bent = self.torsion.at_rest(torque, compliance, straight)
+        rest = angle - slope * compliance - bent * straight
+        constant = np.einsum("mai,mi->ma", moved, rest)
+        hardening = (moved * bent[:, None, :])[setting.measured][:, : len(self.springs)]
+        return (moved * slope[:, None, :])[setting.measured], hardening, constant[setting.measured]
 
 
 def _calibrating(blocks: Sequence[Block]) -> list[Block]:

@@ -99,7 +99,7 @@ def wall_figures(model: DeformationModel, block: Block, fit: BaseFit) -> JSON:
         frame; displacement of the tip from the wall with and without that rotation, mm ([K] eq. 16 to 18);
         the ``curve`` of cut-in and steady cut, mm, not filtered.
     """
-    setting, compliance = model.believed_force(block.setting, fit.beta), model.in_cut(fit.beta)
+    setting = model.believed_force(block.setting, fit.beta)
     matrix, offset = model.design(block, np.zeros(0), fit.beta)
     row = matrix.mean(axis=0)
     zero, *force = np.array([ZERO]) if block.unidentified is None else block.unidentified.mean(axis=0)
@@ -107,11 +107,11 @@ def wall_figures(model: DeformationModel, block: Block, fit: BaseFit) -> JSON:
     sd = math.sqrt(float(row @ fit.covariance @ row) + float(np.sum(np.square(force))))
     measured = float(block.measured.mean())
     read = math.hypot(float(np.sqrt(np.mean(block.sigma**2) / len(block.sigma))), zero)
-    twist = model.twists(setting, compliance)
+    twist = model.twists(setting, fit.beta)
     flange, turned, tip = (
         part[setting.kept].mean(axis=0) for part in deflections(model.arm, setting.commanded, twist)
     )
-    proud = model.deflection(setting, compliance) @ setting.normal
+    proud = model.deflection(setting, fit.beta) @ setting.normal
     along = setting.spacing * np.arange(len(proud)) / MM + block.coordinates["x_mm"][0]
     along -= setting.spacing * setting.kept[0] / MM
     return {
@@ -185,7 +185,7 @@ def _deformation(model: DeformationModel, wall: CutWall, fit: BaseFit) -> JSON:
 
     def deflected(beta: Array) -> Array:
         cut = model.believed_force(wall, beta)
-        return np.asarray(model.deflection(cut, model.in_cut(beta))[wall.kept].mean(axis=0))
+        return np.asarray(model.deflection(cut, beta)[wall.kept].mean(axis=0))
 
     mean = deflected(fit.beta)
     cut = model.believed_force(wall, fit.beta)
