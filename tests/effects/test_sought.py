@@ -48,6 +48,10 @@ class Wall:
         swings = sum(swing.at(setting.t, 0.0) for swing in self.vibration)
         return np.ones((len(setting.t), 1)), swings + MICROMETRE_PER_NM * torque
 
+    def ripples(self, block, joint, orders):
+        """Ripples of 1 N m, as complex amplitudes of a cosine; only the torque of the second joint is seen."""
+        return (joint == 1) * MICROMETRE_PER_NM * np.exp(1j * np.outer(block.setting.q[:, joint], orders))
+
 
 def wall(run, seconds):
     t = np.arange(round(seconds * RATE)) / RATE
