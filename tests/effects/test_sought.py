@@ -49,7 +49,7 @@ class Wall:
         return np.ones((len(setting.t), 1)), swings + MICROMETRE_PER_NM * torque
 
     def ripples(self, block, joint, orders):
-        """Ripples of 1 N m, as complex amplitudes of a cosine; only the torque of the second joint is seen."""
+        """Ripples of 1 N m, as complex amplitudes of a cosine; of the second joint alone."""
         return (joint == 1) * MICROMETRE_PER_NM * np.exp(1j * np.outer(block.setting.q[:, joint], orders))
 
 
