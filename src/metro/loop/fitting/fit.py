@@ -12,7 +12,6 @@ from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import chdtri
 
 from metro.loop.fitting import noise as noise_room
 from metro.loop.fitting.candidate import Candidate, predicting, started
@@ -192,8 +191,9 @@ def _by_chance(candidate: Candidate, count: int) -> float:
 
     It is the mean; of an effect that was sought in many places, what one of them gains more often than not.
     """
-    sought = candidate.effects[-1].sought
-    return max(HOPELESS * count, float(chdtri(count, 1.0 / sought)))
+    from scipy.special import chdtri
+
+    return max(HOPELESS * count, float(chdtri(count, 1.0 / candidate.effects[-1].sought)))
 
 
 def _distinct(reached: Sequence[tuple[float, State]], apart: float) -> list[State]:
