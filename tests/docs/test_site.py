@@ -110,6 +110,8 @@ def test_a_broken_link_and_a_page_outside_the_navigation_stop_the_build(tmp_path
     for name in ("docs", "scripts"):
         shutil.copytree(ROOT / name, tmp_path / name)
     shutil.copy(ROOT / "mkdocs.yml", tmp_path)
+    for page in (tmp_path / "docs").glob("*.md"):
+        page.write_text(f"# {page.stem}\n")
     (tmp_path / "docs" / "stray.md").write_text("# Stray\n\n[nowhere](nowhere.md)\n")
     done = build(tmp_path, tmp_path / "mkdocs.yml")
     assert done.returncode

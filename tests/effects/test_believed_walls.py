@@ -132,7 +132,7 @@ def of_gears(seed):
     return task, replace(task, base=base, blocks=blocks, scatter=scatter)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+@pytest.mark.parametrize("seed", [*(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2, 3)), 4])
 def test_gears_in_three_pieces_harden_no_joint(seed, monkeypatch):
     """Springs that are a fifth softer below a tenth of the rated torque are what gears are.
 

@@ -69,6 +69,7 @@ def test_applying_breaks_one_tooth_of_the_force_model_and_touches_nothing_else()
     assert replace(changed, chipped=()) == model
 
 
+@pytest.mark.slow
 def test_a_chipped_tooth_is_taken_for_nothing_of_the_library(tmp_path):
     hidden = {"chipped_tooth": {"tooth": 1, "length_um": 40.0}}
     outcome, verdict, _ = closed(tmp_path, hidden, 2)

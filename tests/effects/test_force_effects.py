@@ -46,7 +46,10 @@ HIDDEN = {
 
 
 # Each of these is searched for a minute or more; the others show the same of tool, work and instrument.
-LONG = {"chip_size_effect", "entry_exit_force", "charge_drift", "pitch_error"}
+LONG = {
+    *("chip_size_effect", "entry_exit_force", "charge_drift", "pitch_error", "orbit_stiffness"),
+    "dynamometer_resonance",
+}
 NAMES = [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in sorted(HIDDEN)]
 
 

@@ -138,6 +138,7 @@ def elsewhere(cell, offset=(0.0, 0.12, 0.0)):
     return torque
 
 
+@pytest.mark.slow
 def test_a_tool_that_is_far_elsewhere_is_still_named(cell):
     ((name, _, values),) = found(cell, elsewhere(cell))
     assert name == "tool_offset_error"
@@ -145,7 +146,12 @@ def test_a_tool_that_is_far_elsewhere_is_still_named(cell):
 
 
 # The row of another tool: as long as the one that was declared, but it points elsewhere.
-@pytest.mark.parametrize("offset", [(-0.35, 0.08, 0.1), (0.3, 0.13, -0.07), (-0.36, -0.04, 0.06)])
+ELSEWHERE = [(-0.35, 0.08, 0.1), (-0.36, -0.04, 0.06)]
+
+
+@pytest.mark.parametrize(
+    "offset", [(0.3, 0.13, -0.07), *(pytest.param(at, marks=pytest.mark.slow) for at in ELSEWHERE)]
+)
 def test_the_row_of_another_tool_is_named_and_no_torque_is_taken_for_another_joints(cell, offset):
     torque = elsewhere(cell, offset)
     assert joint_slips(joint_force.problem(cell[0], cell[1] | {"joint_torque": torque}, {})) == ()
@@ -188,7 +194,7 @@ def test_the_strain_that_an_effect_takes_from_the_instruments_counts_for_it(cell
     assert with_it["instruments"] > without["instruments"] + 1.0
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_instruments_that_are_off_as_stated_are_no_effect_and_their_gains_are_told(cell, seed):
     rng = np.random.default_rng(seed)
     joints, axes = rng.normal(0.0, joint_force.DRIVEN, 6), rng.normal(0.0, joint_force.CALIBRATED, 3)

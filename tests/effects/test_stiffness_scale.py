@@ -122,6 +122,7 @@ def test_the_arm_of_the_bundled_batch_is_softer_in_the_cut_than_in_its_load_test
     assert found["value"] == pytest.approx(0.5, rel=0.05)
 
 
+@pytest.mark.slow
 def test_an_arm_as_stiff_in_the_cut_as_in_its_load_tests_is_left_alone(tmp_path, monkeypatch):
     from virtual_cell.recipes import kr160
 

@@ -51,7 +51,7 @@ def test_a_bent_tool_is_taken_for_no_joint_and_the_rest_is_said_to_be_like_one()
     np.testing.assert_allclose(outcome.likeness.theta, [80.0], rtol=0.2)
 
 
-@pytest.mark.parametrize("factor", [0.8, 1.2])
+@pytest.mark.parametrize("factor", [0.8, pytest.param(1.2, marks=pytest.mark.slow)])
 def test_a_softer_arm_is_no_bent_tool(factor):
     outcome = search(bent(0.0, {"factor": dict.fromkeys(range(1, 7), factor)}), EFFECTS, GATES)
     assert outcome.names == ("stiffness_scale",)

@@ -44,7 +44,7 @@ def short_plans(*arguments):
 planned = recipe._plans
 
 
-@pytest.mark.parametrize("seed", [3, 6])
+@pytest.mark.parametrize("seed", [3, pytest.param(6, marks=pytest.mark.slow)])
 def test_the_stiffness_of_a_tool_that_yields_beside_its_runout_is_found(tmp_path, monkeypatch, seed):
     monkeypatch.setattr(recipe, "_plans", short_plans)
     recipe.make(tmp_path / "blind-test", {"tool_runout": RUNOUT, "tool_deflection": SPRING}, seed)

@@ -14,7 +14,8 @@ from metro.observables.force.model import ForceModel
 RADIUS_UM, ANGLE_DEG = 9.0, 40.0
 
 
-@pytest.mark.parametrize("seed", [3, pytest.param(5, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [3, 5])
 def test_hidden_runout_is_found_with_its_radius_and_angle(tmp_path, seed):
     hidden = {"tool_runout": {"radius_um": RADIUS_UM, "angle_deg": ANGLE_DEG}}
     outcome, verdict, teeth = closed(tmp_path, hidden, seed)

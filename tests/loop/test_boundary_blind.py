@@ -70,6 +70,7 @@ def test_an_effect_of_the_march_is_found(name, values):
         assert found["axis"]["value"] == "x"
 
 
+@pytest.mark.slow
 def test_what_softens_with_speed_or_yields_with_depth_is_told_by_the_next_test():
     """High lobes are those of fast speeds: by these tests alone either may be the cause."""
     verdict = judged({"spindle_speed_softening": {"change_per_krpm": -0.06}}, 16)

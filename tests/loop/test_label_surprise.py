@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from label_toy import GATES, Line, problem
 from scipy import stats
 
@@ -29,8 +30,9 @@ def labelled(true, seed):
     return replace(task, unstable=drawn(tests, boundary, float(errors.sd[one]), rng) > 0.5)
 
 
-def test_where_the_model_is_right_it_is_small_as_often_as_it_says():
-    found = np.array([surprised(labelled(Line(), seed), seed) for seed in range(50)])
+@pytest.mark.parametrize("batches", [20, pytest.param(50, marks=pytest.mark.slow)])
+def test_where_the_model_is_right_it_is_small_as_often_as_it_says(batches):
+    found = np.array([surprised(labelled(Line(), seed), seed) for seed in range(batches)])
     assert stats.kstest(found, "uniform").pvalue > 0.01
     assert np.mean(found < 0.01) < 0.1
 
@@ -63,8 +65,9 @@ def loose(seed):
     return replace(tests, unstable=labels), mine, errors
 
 
-def test_where_parameters_leave_many_boundaries_it_is_small_as_often_as_it_says():
-    found = np.array([surprise(*loose(seed), seed) for seed in range(60)])
+@pytest.mark.parametrize("batches", [20, pytest.param(60, marks=pytest.mark.slow)])
+def test_where_parameters_leave_many_boundaries_it_is_small_as_often_as_it_says(batches):
+    found = np.array([surprise(*loose(seed), seed) for seed in range(batches)])
     assert stats.kstest(found, "uniform").pvalue > 0.01
     assert np.mean(found < 0.05) < 0.15
 

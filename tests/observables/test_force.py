@@ -17,6 +17,7 @@ from metro.cutting.cutter import Cutter, evenly_pitched
 from metro.cutting.engagement import Engagement
 from metro.cutting.force import COEFFICIENTS, Cut
 from metro.cutting.law import EdgeLaw
+from metro.effects import tool_runout
 from metro.effects.library import library, with_declared
 from metro.loop.ceiling import ceiling
 from metro.loop.fitting.candidate import Candidate
@@ -211,7 +212,7 @@ def fit_of(observed):
 def test_helical_runs_give_their_coefficients_once_the_runout_is_known(tmp_path):
     out = tmp_path / "out"
     helical = Observed(ROOT / "data" / "raw" / "trimule-helical", out)
-    radius, angle = search(helical.task, library("force"), GATES).final.theta
+    radius, angle = search(helical.task, (tool_runout.EFFECT,), GATES).final.theta
     known = {"tool_runout": {"radius_um": radius, "angle_deg": angle}}
     batch = replace(helical.batch, manifest=helical.batch.manifest | {"known": known})
     task = with_declared(force.problem(batch, helical.observed, {}), known)

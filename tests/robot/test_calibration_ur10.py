@@ -41,11 +41,8 @@ def series(name, count):
 
 @pytest.fixture(scope="module")
 def found():
-    """Return of both series the calibration, and the CPU time of the larger one."""
-    started = time.process_time()
-    grid = calibrated(series("grid", 5000), ROWS)
-    seconds = time.process_time() - started
-    return {"grid": grid, "random": calibrated(series("random", 5000), ROWS)}, seconds
+    """Return the calibration by either series."""
+    return {name: calibrated(series(name, 1500), ROWS) for name in FILES}
 
 
 def curve(fit, joint, degrees):
@@ -57,7 +54,7 @@ def curve(fit, joint, degrees):
     return basis @ fit.values[place]
 
 
-@pytest.mark.parametrize("count", [1000, pytest.param(5000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [500, pytest.param(5000, marks=pytest.mark.slow)])
 def test_held_out_poses_of_the_random_series_are_predicted(count):
     for held in left_out(series("random", count), ROWS):
         nominal, geometry, effects = (1e3 * np.median(distances) for distances in held.distances)
@@ -67,12 +64,15 @@ def test_held_out_poses_of_the_random_series_are_predicted(count):
         assert effects < 0.12
 
 
-def test_five_thousand_poses_with_all_effects_are_fitted_within_a_minute(found):
-    assert found[1] < SECONDS
+@pytest.mark.slow
+def test_five_thousand_poses_with_all_effects_are_fitted_within_a_minute():
+    started = time.process_time()
+    calibrated(series("grid", 5000), ROWS)
+    assert time.process_time() - started < SECONDS
 
 
 def test_what_was_left_is_the_curves_of_five_joints_readings(found):
-    for one in found[0].values():
+    for one in found.values():
         assert {e.joint for e in one.final.effects if e.code == "curve"} == {0, 1, 2, 3, 4}
         assert one.final.scale < 6e-5
         assert one.fits[1].scale > 1.5e-4
@@ -84,7 +84,7 @@ def test_a_curve_of_one_series_is_that_of_the_other(found, joint, low, high):
     degrees = np.arange(low, high, 0.5)
     turn = np.deg2rad(degrees)
     geometry = np.column_stack([np.ones_like(turn), turn, np.sin(turn), np.cos(turn)])
-    both = [curve(found[0][name].final, joint, degrees) for name in ("grid", "random")]
+    both = [curve(found[name].final, joint, degrees) for name in ("grid", "random")]
     first, second = (v - geometry @ np.linalg.lstsq(geometry, v, rcond=None)[0] for v in both)
     assert np.corrcoef(first, second)[0, 1] > 0.95
     assert 2e-4 < np.std(first) < 6e-4
