@@ -1,5 +1,6 @@
 """A path without its start from rest, and torques that follow the force late."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -39,6 +40,32 @@ def test_a_lag_of_the_drives_is_a_clock_that_is_late_by_as_much():
     np.testing.assert_allclose(matrix @ late + offset, other @ beta + none, atol=1e-9)
     without, zero = model.design(block, np.zeros(0), beta)
     assert np.abs(matrix @ late + offset - without @ beta - zero).max() > 0.1
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.0694, -0.0131])
+def test_a_clock_and_a_lag_change_the_torques_alike_however_late_they_are(lag):
+    """A force with the ripple of the teeth, which no derivative over 5 ms is about."""
+    arm = arm_of_cell({"arm": {"dh": DH}}, {})
+    t, fine = np.linspace(0.0, 4.0, 81), np.linspace(0.0, 4.0, 8001)
+    ripple = 30.0 * np.sin(2 * np.pi * 180.0 * fine)
+    record = running(fine, np.column_stack([50 * np.sin(3 * fine) + ripple, ripple, fine]))
+    still = np.tile([0.1, -0.4, 0.2, 0.3, 0.8, 0.2], (81, 1))
+    run = TorqueRun(still, np.zeros_like(still), t, t, np.full(81, 0.05), record, still)
+    block = SimpleNamespace(setting=run)
+    names = np.array([one.name for one in JointForceModel(arm).parameters])
+    beta = np.where(names == "torque_gain", 1.0, 0.0) + np.where(names == "drive_lag", lag, 0.0)
+    clock, step = JointForceModel(arm, offset=0.0447), 1e-5
+    own = clock.design(block, np.zeros(0), beta)[0][:, names == "drive_lag"][:, 0]
+    moved, _ = clock.differences([replace(clock, offset=0.0447 + step)], block, np.zeros((1, 0)), beta)
+    np.testing.assert_allclose(moved[0] / step, own, atol=1e-6 * np.abs(own).max())
+    for less in (0.0447, 0.02, -0.1):
+        other = replace(clock, offset=clock.offset - less)
+        later = np.where(names == "drive_lag", beta + less, beta)
+        expected, reached = (
+            model.predictions(block, np.zeros((1, 0)), given)[0]
+            for model, given in ((clock, beta), (other, later))
+        )
+        np.testing.assert_allclose(reached, expected, atol=1e-6 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize(("ends", "kept"), [((True, True), 60), ((True, False), 50), ((False, False), 39)])

@@ -142,21 +142,21 @@ class JointForceModel:
         """Waves of the torque (k m, 4 k + 12) per base parameter, and those without a force (k m,), N m.
 
         For :class:`Instruments` they are all but the first (4 k + 11, 4 k + 12) themselves; k joints turn.
-        The torques of drives and payload are read with the gains of the joints, too. The lag is linear about
-        that of ``beta``, to a grid.
+        The torques of drives and payload are read with the gains of the joints, too. The time by which the
+        torques are late is linear about that of ``beta``, to a grid.
         """
         run: Any = block.setting
         if isinstance(run, Instruments):
             gains = len(self.parameters)
             return np.eye(gains)[1:], np.zeros(gains - 1)
-        at, lag = self._lagged(beta)
+        at, more = self._lateness(beta)
         matrix, later = basis(self.arm, run, at), late(self.arm, run, at)
         read = self._beside(run)
         if read.any():
             matrix, ends = matrix.copy(), np.arange(len(self.joints) + 1) * len(run.t)
             for i, (first, end) in enumerate(pairwise(ends)):
                 matrix[first:end, 1 + i] += read[first:end]
-        return matrix, read - lag * later
+        return matrix, read + (more - (0.0 if beta is None else beta[-1])) * later
 
     def predictions(self, block: Block, nuisances: Array, beta: Array) -> Array:
         """Prediction (k, n) of a block, k times the same: no run has unknowns of its own.
@@ -167,9 +167,10 @@ class JointForceModel:
         if isinstance(run, Instruments):
             predicted = beta[1:]
         else:
-            at, lag = self._lagged(beta)
+            at, more = self._lateness(beta)
             read, each = self._beside(run), np.repeat(beta[1 : 1 + len(self.joints)], len(run.t))
-            predicted = basis(self.arm, run, at) @ beta + (1.0 + each) * read - lag * late(self.arm, run, at)
+            later = (more - beta[-1]) * late(self.arm, run, at)
+            predicted = basis(self.arm, run, at) @ beta + (1.0 + each) * read + later
         return np.broadcast_to(predicted, (len(nuisances), len(predicted)))
 
     def differences(
@@ -177,7 +178,8 @@ class JointForceModel:
     ) -> tuple[Array, Array]:
         """Return by how much predictions differ (:class:`metro.observables.problem.Differing`).
 
-        Where the arm or the clock is another one, the torques are added up before they become waves.
+        Where the arm or the clock is another one, the torques are added up before they become waves, all
+        linear about one lateness: the derivatives of clock and lag are alike.
         """
         run: Any = block.setting
         size = len(beta) - 1 if isinstance(run, Instruments) else len(self.joints) * len(run.t)
@@ -185,10 +187,11 @@ class JointForceModel:
         if isinstance(run, Instruments):
             return moved, others_own
         read, each = self._beside(run), 1.0 + np.repeat(beta[1 : 1 + len(self.joints)], len(run.t))
+        at, _ = self._lateness(beta)
         for i, other in enumerate(others):
             moved[i] = each * (other._beside(run) - read)
             if other.arm is not self.arm or other.offset != self.offset:
-                moved[i] += other._asked(run, beta) - self._asked(run, beta)
+                moved[i] += other._asked(run, beta, at) - self._asked(run, beta, at)
         return moved, others_own
 
     def ripples(self, block: Block, joint: int, orders: Array) -> ComplexArray:
@@ -199,24 +202,27 @@ class JointForceModel:
         seen[self.joints.index(joint)] = waves(torque.view(float)).view(complex)
         return seen.reshape(-1, len(orders))
 
-    def _asked(self, run: TorqueRun, beta: Array) -> Array:
-        """Waves (k m,), N m, of the torques that balance the force, with all gains.
+    def _asked(self, run: TorqueRun, beta: Array, at: float) -> Array:
+        """Waves (k m,), N m, of the torques that balance the force, with all gains, linear about a lateness.
 
-        It is what :func:`basis` makes of the force, in one transform of k torques instead of one of 11 k.
+        As :func:`basis` makes them of the force, in one transform of k torques instead of one of 11 k.
         """
-        at, lag = self._lagged(beta)
         force, later, curved = _forces(run, at)
         of_joints, by_axis, across = np.split(beta[1:], np.cumsum([len(self.joints), 3, len(CROSS)]))[:3]
         gains = np.diag(beta[0] + by_axis)
         gains[tuple(np.transpose(CROSS))] = across
         jacobian = _driven_jacobian(self.arm, run)
-        acting = force @ gains.T + beta[-2] * curved + (beta[-1] - lag) * later
+        acting = force @ gains.T + beta[-2] * curved + (self.offset + beta[-1] - at) * later
         return in_waves(joint_torque(jacobian, acting) + of_joints * joint_torque(jacobian, force))
 
-    def _lagged(self, beta: Array | None) -> tuple[float, float]:
-        """By how much the log is late and the lag on the grid about which that is linear, both s."""
-        lag = 0.0 if beta is None else LAG_GRID * round(float(beta[-1]) / LAG_GRID)
-        return self.offset + lag, lag
+    def _lateness(self, beta: Array | None) -> tuple[float, float]:
+        """By how much the torques are late by clock and lag: on a grid, and what is more than that, both s.
+
+        Only their sum shows: were one of them on the grid alone, a descent would stop between the two.
+        """
+        whole = self.offset + (0.0 if beta is None else float(beta[-1]))
+        at = LAG_GRID * round(whole / LAG_GRID)
+        return at, whole - at
 
     def _beside(self, run: TorqueRun) -> Array:
         """Waves (k m,), N m, of the torques of drives and payload."""
