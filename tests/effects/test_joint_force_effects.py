@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from metro.batch.processed import Processed, read_batch
+from metro.effects import clock_offset
 from metro.effects.effect import fitted_to
 from metro.effects.library import library
 from metro.effects.tool_offset_error import EFFECT
@@ -236,6 +237,16 @@ def test_a_gear_that_ripples_is_found_with_its_order(cell):
     assert (name, where) == ("gear_ripple", {"joint": 1})
     assert values["order"] == pytest.approx(800.0, abs=5.0)
     assert values["torque_nm"] == pytest.approx(6.0, rel=0.15)
+
+
+@pytest.mark.parametrize("late_s", [-0.641, 1.4])
+def test_a_clock_is_sought_where_torques_rise_with_the_force_however_far_it_is(cell, late_s):
+    force = cell[1]["tool_force"].copy()
+    force["t_s"] -= late_s
+    task = joint_force.problem(cell[0], cell[1] | {"tool_force": force}, {})
+    assert joint_slips(task) == ()
+    ((effect,), _) = fitted_to((clock_offset.EFFECT,), task)
+    assert min(abs(start - 1e3 * late_s) for start in effect.parameters[0].starts) < 20.0
 
 
 def test_a_clock_that_is_late_is_found_to_a_few_milliseconds(cell):

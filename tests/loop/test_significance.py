@@ -41,6 +41,21 @@ def test_the_p_value_is_that_of_the_interval(bent):
     assert least_significant(at_the_end)[1] == pytest.approx(0.05)
 
 
+def test_what_may_be_so_without_the_effect_is_no_part_of_its_size(bent):
+    """Six deviations beside a neutral value known within three are 6/√10 of Student's t."""
+    from scipy.stats import t
+
+    alone = fit(Candidate(bent.candidate.base, (BEND,)), bent.blocks, bent.noise)
+    sd, dof = float(np.sqrt(alone.covariance[-1, -1] * alone.dispersion)), len(alone.blocks) - 1
+    unsure = replace(BEND, parameters=(replace(BEND.parameters[0], neutral_sd=3.0 * sd),))
+    far = replace(
+        alone,
+        candidate=Candidate(bent.candidate.base, (unsure,)),
+        theta=np.array([BEND.parameters[0].neutral + 6.0 * sd]),
+    )
+    assert least_significant(far)[1] == pytest.approx(2.0 * t.sf(6.0 / np.sqrt(10.0), dof))
+
+
 def test_what_is_significant_stays_and_what_is_not_goes(monkeypatch):
     task = problem(9, truth=Wave(bend=0.2), phased=False)
     assert search(task, (BEND, RIPPLE), GATES).names == ("bend",)

@@ -15,7 +15,8 @@ from metro.loop.fitting.fit import fit
 from metro.loop.fitting.noise import first_noise, missed
 from metro.loop.search.search import search
 from metro.loop.search.trial import Gates
-from metro.observables.arm.give import GivingArm, give_per_newton, giving_arm
+from metro.observables.arm.give import GivingArm, give_of, giving_arm
+from metro.observables.arm.load_tests import largest_loads
 from metro.observables.arm.tip_force import Log
 from metro.observables.arm.wall import Wall
 from metro.observables.cut import conditions as cutting_force
@@ -60,6 +61,44 @@ def test_the_give_is_the_compliance_of_the_tip_along_the_wall_normal(cell):
     assert known.give(Refusal("no log"), face, newton) == 0.0
 
 
+@pytest.mark.parametrize(("joint", "newton"), [(1, 1.0), (1, 300.0), (3, 40.0), (5, 1e4)])
+def test_the_give_is_as_unsure_as_gears_are_that_a_cut_turns_less_far_than_a_load_test(cell, joint, newton):
+    """One elastic joint: its twist within 5 %, and 4 % of the largest one, passed by a tanh."""
+    known = giving_arm(*cell)
+    arm, softness = known.tested.arm, np.zeros(6)
+    softness[joint] = 2e-6
+    q, normal = np.radians([-20.3, -13.9, -4.4, -61.7, 34.9, 56.7]), np.array([0.6, 0.8, 0.0])
+    step = 1e-6 * np.eye(6)[joint]
+    turned = (arm.tip((q + step)[None]) - arm.tip((q - step)[None]))[0] / 2e-6
+    force = newton * np.array([0.2, -0.9, 0.4])
+    twist = 2e-6 * abs(turned @ force)
+    most = 2e-6 * largest_loads(known.tested, known.loads)[joint]
+    passed = most * math.tanh(twist / (0.2 * most))
+    expected = abs(normal @ turned) * math.hypot(0.05 * twist, 0.04 * (passed - twist))
+    one = replace(known, compliance=softness)
+    log, face = Log(q[None], q[None], 0 * q[None], arm.tip(q[None])), Wall(normal, normal, 0.0, 0.1, 0.0)
+    assert one.give_sd(log, face, force) == pytest.approx(expected, rel=1e-6)
+    without = replace(one, loads=known.loads.iloc[:0])
+    assert without.give_sd(log, face, force) == pytest.approx(abs(normal @ turned) * 0.05 * twist, rel=1e-6)
+    assert one.give_sd(log, replace(face, normal=0 * normal), force) == 0.0
+    assert one.give_sd(Refusal("no log"), face, force) == 0.0
+
+
+def test_what_the_joints_may_be_softer_adds_up(cell):
+    known = giving_arm(*cell)
+    arm = known.tested.arm
+    q = np.radians([[-20.3, -13.9, -4.4, -61.7, 34.9, 56.7]])
+    log, face = (
+        Log(q, q, 0 * q, arm.tip(q)),
+        Wall(np.array([1.0, 0, 0]), np.array([0, 1.0, 0]), 0.0, 0.1, 0.0),
+    )
+    force = np.array([30.0, -110.0, 45.0])
+    each = [replace(known, compliance=known.compliance * one).give_sd(log, face, force) for one in np.eye(6)]
+    assert known.give_sd(log, face, force) == pytest.approx(sum(each))
+    assert min(each) >= 0.0
+    assert 0.04 < sum(each) / abs(known.give(log, face, force)) < 0.3
+
+
 def test_a_tip_that_was_declared_wrong_gives_way_as_the_load_tests_measured(cell):
     """The load tests and the cut are of one tip, wherever the cell file puts it."""
     batch, read = cell
@@ -68,12 +107,17 @@ def test_a_tip_that_was_declared_wrong_gives_way_as_the_load_tests_measured(cell
     wrong["tool_in_flange_mm"] = [-z, x, y]  # the row of another tool, as long, that points elsewhere
     declared = replace(batch, manifest=wrong)
     for run in SIDE:
-        true, found = (give_per_newton(each, run, read, giving_arm(each, read)) for each in (batch, declared))
+        true, found = (
+            give_of(each, run, read, giving_arm(each, read), np.ones(3)).per_newton
+            for each in (batch, declared)
+        )
         assert np.abs(found - true).max() < 0.1 * np.abs(true).max()
 
 
 def test_a_machine_that_is_no_arm_gives_nothing(cell):
-    assert not give_per_newton(cell[0], "r01", cell[1], Refusal("no arm.dh")).any()
+    give = give_of(cell[0], "r01", cell[1], Refusal("no arm.dh"), np.ones(3))
+    assert not give.per_newton.any()
+    assert give.sd == 0.0
 
 
 def test_the_give_of_a_held_out_run_is_predicted_and_nothing_of_its_force_is_read(cell):

@@ -136,6 +136,22 @@ def test_one_wild_order_is_drawn_towards_its_neighbours_but_not_lost():
     assert own == pytest.approx(true, rel=1.5)
 
 
+@pytest.mark.parametrize(("revolutions", "low", "high"), [(1.5, 0.8, 1.2), (6, 0.8, 1.3), (40, 0.9, 1.15)])
+def test_the_error_of_a_short_record_is_as_large_as_repeats_of_it_scatter(revolutions, low, high):
+    """White noise; a record of one revolution has but its own samples to say so, six make three segments."""
+    rng, speed = np.random.default_rng(4), 63.3
+    time = np.arange(int(5000 * revolutions / speed)) / 5000
+    angle = 2 * np.pi * speed * time
+    shape = np.stack([10 * np.cos(3 * angle + 0.3), 5 + 0 * angle, np.cos(6 * angle)], axis=1)
+    found = [
+        order_averages(time, angle, shape + 2.0 * rng.standard_normal(shape.shape), 20, 1)[0]
+        for _ in range(150)
+    ]
+    scatter = np.var([one.value for one in found], axis=0)
+    assert np.all(found[0].variance > 0.0)
+    assert low < np.mean([one.variance for one in found]) / scatter.mean() < high
+
+
 @pytest.mark.parametrize("turn", [0.0, 0.4, 2.9, 5.5])
 def test_a_waveform_is_turned_back_to_where_it_was(turn):
     rng = np.random.default_rng(5)

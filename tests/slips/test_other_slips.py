@@ -61,6 +61,16 @@ def test_a_gain_that_no_drive_has_is_found_with_its_interval(monkeypatch):
     assert "100 ±" in said(joint_slips(torques(monkeypatch, lambda asked: 100.0 * asked)))
 
 
+def test_torques_that_follow_the_force_at_another_time_have_no_gain_of_a_drive(monkeypatch):
+    """Half of such a torque is as the force asks for, as of a clock that is late by most of an entry."""
+
+    def later(asked, unit=1.0):
+        return unit * (0.45 * asked + 0.9 * np.roll(asked, 7, axis=1))
+
+    assert joint_slips(torques(monkeypatch, later)) == ()
+    assert "the unit of tau1_nm" in said(joint_slips(torques(monkeypatch, lambda a: later(a, 1e-3))))
+
+
 STATIONS = pd.DataFrame({"position": ["1"], "kx_n_um": [0.93], "ky_n_um": [31.0], "kz_n_um": [9.3]})
 
 

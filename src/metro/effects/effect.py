@@ -37,6 +37,8 @@ class EffectParameter:
     group : parameters of a group are started from all combinations of their ``starts``, group after group,
         those of later groups ``neutral`` meanwhile.
     neutral : value at which the parameter's group changes nothing.
+    neutral_sd : standard deviation of what is believed to be neutral, of its reciprocal where that acts: an
+        arm may be as soft as that in the cut, and nothing is missing.
     choices : what the values 0, 1, … stand for, where the parameter is a choice among these.
     nothing_below, nothing_above : whether nothing can be beyond the lower, the upper bound: no tool is
         rounder than a ball. A value at such a bound may be true, at any other the true value is beyond it.
@@ -58,6 +60,7 @@ class EffectParameter:
     plausible: float | None = None
     group: int = 0
     neutral: float = 0.0
+    neutral_sd: float = 0.0
     choices: tuple[str, ...] = ()
     local: bool = False
     nothing_below: bool = False

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from metro.effects.effect import Effect, EffectParameter, per_joint
 from metro.effects.elastic_joints import with_joints
 from metro.effects.parts import WithStructure, WithTorsion
@@ -43,9 +45,12 @@ OF_MACHINE = Effect(
 
 
 def _gives_way(effect: Effect, problem: Any) -> Effect | Refusal:
-    if not any(getattr(block.setting, "give", 0.0) for block in problem.blocks):
+    give = np.array([getattr(block.setting, "give", 0.0) for block in problem.role("identify")])
+    if not give.any():
         return Refusal("")  # no machine that gives way, or it is said already that nobody knows how far
-    return effect
+    sd = np.array([getattr(block.setting, "give_sd", 0.0) for block in problem.role("identify")])
+    unsure = float(np.linalg.norm(sd) / np.linalg.norm(give))  # how much softer the gears of an arm may be
+    return replace(effect, parameters=(replace(effect.parameters[0], neutral_sd=unsure),))
 
 
 # Without waves, one start on each side of the neutral factor is enough.

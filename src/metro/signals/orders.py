@@ -17,6 +17,7 @@ from metro.units import Array, ComplexArray
 
 SPEED_SEARCH = 0.006
 REVOLUTIONS_PER_SEGMENT = 4.0
+FEWEST = 3  # segments, whose differences say how far each is from the middle of its neighbours
 FINE_STEPS = 20  # to either side of the best of the search
 WORTH = (0.0, 0.67, 0.51)  # degrees of freedom of a difference of first and second order, in white noise
 NEWTON = 4  # steps to the best of the trials of an angle
@@ -203,8 +204,9 @@ def order_averages(time: Array, angle: Array, signal: Array, highest: int, block
 
     Each block is cut into segments of a few revolutions; how far each is from the middle of its neighbours
     gives the error of their mean: what changes slowly, or from block to block, is no error. Blocks of fewer
-    than three segments are taken as one. It is drawn towards its neighbouring orders, since that of few
-    segments is itself uncertain.
+    than three segments are taken as one, and segments of a short record are shorter. It is drawn towards its
+    neighbouring orders, since that of few segments is itself uncertain. A record that is one segment has the
+    error that its samples show about their waveform.
 
     Parameters
     ----------
@@ -218,23 +220,24 @@ def order_averages(time: Array, angle: Array, signal: Array, highest: int, block
     edges[-1] = len(time)
     means, counts, middles = [], [], []
     segments: list[Array] = []
+    enough = (2 * highest + 20) / len(time) * revolutions
+    per_segment = max(min(REVOLUTIONS_PER_SEGMENT, revolutions / FEWEST), enough)
     for start, end in pairwise(edges):
-        pieces = _segments(
-            time[start:end], per_s, max(REVOLUTIONS_PER_SEGMENT, (2 * highest + 20) / len(time) * revolutions)
-        )
+        pieces = _segments(time[start:end], per_s, per_segment)
         within, record = angle[start:end], signal[start:end]
         values = np.stack([_fit(order_matrix(within[p], highest), record[p]) for p in pieces])
         means.append(values.mean(axis=0))
         counts.append(len(pieces))
         middles.append(float(time[start:end].mean()))
         segments.append(values)
-    if min(counts) < 3:
+    if min(counts) < FEWEST:
         segments = [np.concatenate(segments)]
     order = min(2, len(segments[0]) - 1)  # of the differences
     differences = np.concatenate([np.diff(part, order, axis=0) for part in segments]) ** 2
     differences /= math.comb(2 * order, order)
     freedom = WORTH[order] * len(differences)
-    variance = _shrunk(differences.mean(axis=0) if freedom else np.zeros_like(means[0]), freedom)
+    alone = _scatter(order_matrix(angle, highest), signal) if not freedom else differences.mean(axis=0)
+    variance = _shrunk(alone, freedom)
     return [
         OrderAverage(mean, variance / count, middle)
         for mean, count, middle in zip(means, counts, middles, strict=True)
@@ -246,8 +249,23 @@ def _fit(matrix: Array, signal: Array) -> Array:
     return np.asarray(np.linalg.solve(matrix.T @ matrix, matrix.T @ signal).T)
 
 
+def _scatter(matrix: Array, signal: Array) -> Array:
+    """Return the variance of each coefficient, (channels, 2H+1), by what the fit leaves of the samples."""
+    left = signal - matrix @ _fit(matrix, signal).T
+    noise = (left**2).sum(axis=0) / max(len(left) - matrix.shape[1], 1)
+    return np.asarray(np.outer(noise, np.diag(np.linalg.inv(matrix.T @ matrix))))
+
+
 def _shrunk(variance: Array, freedom: float, prior_freedom: int = 6) -> Array:
-    """Draw each order's variance, (channels, 2H+1), towards the median of five orders on each side."""
-    padded = np.pad(variance, ((0, 0), (10, 10)), mode="edge")
+    """Draw each order's variance, (channels, 2H+1), towards the typical one of five orders on each side.
+
+    That is their median over that of chi-squared, which is far below its mean where few segments made it.
+    """
+    from scipy.special import chdtri
+
+    padded = np.pad(variance, ((0, 0), (10, 10)), mode="reflect")
     neighbours = np.median(np.lib.stride_tricks.sliding_window_view(padded, 21, axis=1), axis=2)
+    if freedom:
+        each = max(freedom, 1.0)  # a single difference has one degree of freedom
+        neighbours = neighbours * each / chdtri(each, 0.5)
     return np.asarray((freedom * variance + prior_freedom * neighbours) / (freedom + prior_freedom))

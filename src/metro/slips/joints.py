@@ -90,11 +90,13 @@ def _moved(
 
 
 def _gain(sums: _Moments) -> tuple[Slip, ...]:
-    """Judge the one gain of all torques."""
-    power = float(np.trace(sums.predicted))
-    gain, deviation = float(np.trace(sums.across)) / power, 1.0 / np.sqrt(power)
+    """Judge the one gain of all torques, where they follow the force: a clock that is late lowers it, too."""
+    power, across, own = (float(np.trace(each)) for each in (sums.predicted, sums.across, np.diag(sums.own)))
+    gain, deviation = across / power, 1.0 / np.sqrt(power)
     low, high = GAINS
-    if low - DEVIATIONS * deviation <= gain <= high + DEVIATIONS * deviation:
+    as_declared, with_gain = own - 2.0 * across + power, own - gain * across
+    within = low - DEVIATIONS * deviation <= gain <= high + DEVIATIONS * deviation
+    if within or with_gain > BETTER**2 * as_declared:
         return ()
     found = (
         f"the torques of the joints are {gain:.3g} ± {1.96 * deviation:.2g} times those that the "

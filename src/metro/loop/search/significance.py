@@ -25,7 +25,7 @@ def _p_value(fitted: Fit, effect: Effect, place: slice) -> float:
     """Test of all sizes together (Wald), by F on the degrees of freedom of intervals.
 
     An angle is no size, nor what has no value at which it changes nothing, as a frequency. The size of what
-    acts by its reciprocal is that.
+    acts by its reciprocal is that. What may be as it is without the effect is no part of it.
     """
     from scipy.stats import f
 
@@ -34,7 +34,8 @@ def _p_value(fitted: Fit, effect: Effect, place: slice) -> float:
     theta, neutral = fitted.theta[place], np.array([one.neutral for one in effect.parameters])
     inverse = np.array([one.reciprocal for one in effect.parameters])
     turned = np.where(inverse, -1.0 / np.where(inverse, theta, 1.0) ** 2, 1.0)
-    covariance = covariance * np.outer(turned, turned)
+    unsure = np.diag([one.neutral_sd**2 for one in effect.parameters])
+    covariance = covariance * np.outer(turned, turned) + unsure
     away = theta - neutral
     away[inverse] = 1.0 / theta[inverse] - 1.0 / neutral[inverse]
     sized = np.array(

@@ -12,7 +12,7 @@ from metro.robot.kinematics import Arm
 from metro.robot.statics import driven_jacobian, joint_torque
 from metro.units import MS, Array
 
-WIDEST, COARSE = 1.0, 20 * MS  # s, range and step of the offsets that are tried first
+WIDEST, COARSE = 2.0, 20 * MS  # s, range and step of the offsets that are tried first
 STEP = 1 * MS
 ROUNDS = 8
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -10,14 +11,22 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
 from metro.observables.arm import tip_force
-from metro.observables.arm.load_tests import best_compliance, joint_places, usable, with_best_tip
+from metro.observables.arm.load_tests import (
+    best_compliance,
+    joint_places,
+    largest_loads,
+    usable,
+    with_best_tip,
+)
 from metro.observables.arm.no_arm import no_arm
 from metro.observables.arm.tip_force import Log
 from metro.observables.arm.wall import Wall, wall
 from metro.observables.arm.wall_profile import in_one_pose
+from metro.observables.deformation.blocks import SOFTER, TWISTED
 from metro.observables.deformation.model import DeformationModel
 from metro.observables.problem import Refusal
 from metro.robot.kinematics import arm_of_cell
+from metro.robot.statics import moving_jacobian
 from metro.units import Array
 
 
@@ -53,6 +62,30 @@ class GivingArm:
         middle = log.commanded[len(log.commanded) // 2]
         return float(face.normal @ self.tested.contributions(middle, force) @ self.compliance)
 
+    def give_sd(self, log: Log | Refusal, face: Wall, force: Array) -> float:
+        """Return by how much the wall may be prouder than :meth:`give` says, or less so, m.
+
+        A cut turns the joints less far than load tests do, where gears are softer and have passed less of
+        their lost motion. All gears are: what that makes of the joints adds up.
+        """
+        if isinstance(log, Refusal) or not face.normal.any():
+            return 0.0
+        middle, largest = log.commanded[len(log.commanded) // 2], largest_loads(self.tested, self.loads)
+        moved = face.normal @ moving_jacobian(self.tested.arm, middle, self.tested.flange_rotation)
+        torque = self.tested.torques(middle, force)
+        twist, more = self.compliance * torque, np.zeros(len(torque))
+        if len(largest):
+            gears = replace(self.tested, springs=tuple(self.compliance), loaded=tuple(largest))
+            more = gears.lost(torque) - twist
+        return float(np.abs(moved) @ np.hypot(SOFTER * twist, TWISTED * more))
+
+
+class Give(NamedTuple):
+    """By how much a run's wall is proud: per newton along x, y, z of the work, (3,) m/N; its error, m."""
+
+    per_newton: Array
+    sd: float
+
 
 def giving_arm(batch: Batch, read: Tables) -> GivingArm | Refusal:
     """Return the arm of a batch's cell."""
@@ -64,15 +97,16 @@ def giving_arm(batch: Batch, read: Tables) -> GivingArm | Refusal:
     return GivingArm(model, loads, best_compliance(batch, tested, loads), tested)
 
 
-def give_per_newton(batch: Batch, run: str, read: Tables, arm: GivingArm | Refusal) -> Array:
-    """Height by which a run's wall is proud per newton along x, y, z of the work, (3,) m/N.
+def give_of(batch: Batch, run: str, read: Tables, arm: GivingArm | Refusal, force: Array) -> Give:
+    """Return how far a wall is proud under a mean force (3,) N.
 
     It is zero on a machine without an arm. The give is linear in the mean force, and the prediction changes
     by a few per cent with it.
     """
     if isinstance(arm, Refusal):
-        return np.zeros(3)
+        return Give(np.zeros(3), 0.0)
     face = wall(batch, run)
     cut, _ = tip_force.logs(read("robot", run), arm.model.arm)
     log = arm.log(batch, run, cut, face)
-    return np.array([arm.give(log, face, newton) for newton in np.eye(3)])
+    per_newton = np.array([arm.give(log, face, newton) for newton in np.eye(3)])
+    return Give(per_newton, arm.give_sd(log, face, force) if np.isfinite(force).all() else 0.0)

@@ -139,8 +139,8 @@ class DeformationModel:
         rows = np.eye(len(self.parameters))[setting.places]
         return rows, np.zeros(len(rows))
 
-    def _lost(self, torque: Array) -> Array:
-        """Return the way of each joint, (m, n) rad, if its lost motion is its twist under its largest load.
+    def lost(self, torque: Array) -> Array:
+        """Return the way of each joint, (…, n) rad, if its lost motion is its twist under its largest load.
 
         A gear is softer up to some fraction of its load; beyond that, it has only passed a way that the
         others have not.
@@ -154,13 +154,13 @@ class DeformationModel:
     def _lost_in_test(self, setting: LoadTest) -> Array:
         """Return what load tests gain by that way, (n, k) m."""
         moved, torque = static(self.arm, self.flange_rotation, setting)
-        lost = self._lost(torque)
+        lost = self.lost(torque)
         return np.asarray((moved[..., : lost.shape[1]] * lost[:, None, :])[setting.measured])
 
     def _lost_in_cut(self, setting: CutWall) -> Array:
         """Return what a wall gains by that way, (n, k) m."""
         out, torque = outwards(self.arm, self.flange_rotation, setting)
-        lost = self._lost(self.structure.in_cut(torque) / self.torsion.factors(torque.shape[1]))
+        lost = self.lost(self.structure.in_cut(torque) / self.torsion.factors(torque.shape[1]))
         smooth = profile_filter(len(out), setting.spacing, setting.cutoff)[setting.kept]
         return np.asarray(smooth @ (out[:, : lost.shape[1]] * lost))
 

@@ -49,6 +49,7 @@ def block_of(batch: Batch, run: str, table: pd.DataFrame, tool: Cutter, spindles
         helix=path,
         feed_ratio=float(row["spindle_rpm"]) / float(spindle["spindle_rpm"]),
         give=float(spindle["give_mm"]) * MM,
+        give_sd=float(spindle.get("give_sd_mm", 0.0)) * MM,
     )
     axis = table["axis"].to_numpy().astype(str)
     mean = (table["part"] == "mean").to_numpy()

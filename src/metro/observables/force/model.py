@@ -42,9 +42,9 @@ class ForceSetting:
 
     ``feed_direction`` is the turn of the feed frame about z, rad; ``cut_length`` the length cut from the
     first run to the middle of this one, m; ``give`` the height by which the wall is proud in this ``cut``, m,
-    for an arm with the stiffness of its load tests. ``feed_ratio`` is true over nominal feed per tooth: the
-    feed rate is as programmed, so a spindle that turns more slowly than stated cuts thicker chips. The chip
-    is taken as proportional to it.
+    for an arm with the stiffness of its load tests, and ``give_sd`` its error. ``feed_ratio`` is true over
+    nominal feed per tooth: the feed rate is as programmed, so a spindle that turns more slowly than stated
+    cuts thicker chips. The chip is taken as proportional to it.
     """
 
     cut: Cut
@@ -55,6 +55,7 @@ class ForceSetting:
     helix: Helix | None = None
     feed_ratio: float = 1.0
     give: float = 0.0
+    give_sd: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.batch.processed import Tables
 from metro.cutting.cutter import Cutter
-from metro.observables.arm.give import give_per_newton, giving_arm
+from metro.observables.arm.give import give_of, giving_arm
 from metro.observables.cut import conditions as cutting_force
 from metro.observables.cut.long_record import LongRecord, Stretch
 from metro.observables.force.coefficients import AXES
@@ -43,9 +43,10 @@ def observe(batch: Batch, read: Tables, _identified: JSON) -> dict[str, pd.DataF
     tables = [result for result in results if not isinstance(result, Refusal)]
     for _, row in tables:
         force = np.array([row[f"mean_{axis}_n"] for axis in AXES])
-        per_newton = give_per_newton(batch, row["run"], read, arm) / MM
-        row["give_mm"] = float(per_newton @ force) if np.isfinite(force).all() else 0.0
-        row |= dict(zip(PER_NEWTON, per_newton.tolist(), strict=True))
+        give = give_of(batch, row["run"], read, arm, force)
+        row["give_mm"] = float(give.per_newton @ force) / MM if np.isfinite(force).all() else 0.0
+        row["give_sd_mm"] = give.sd / MM
+        row |= dict(zip(PER_NEWTON, (give.per_newton / MM).tolist(), strict=True))
     refused = [result.reason for result in results if isinstance(result, Refusal)]
     if not tables:
         return Refusal("; ".join(refused))
