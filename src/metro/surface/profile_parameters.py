@@ -128,21 +128,19 @@ def _without_narrow(begins: np.ndarray, narrowest: float) -> np.ndarray:
 
     Without one, the next is on the side of the one before, and goes on with it.
     """
-    count = len(begins)
-    before, behind = np.arange(count) - 1, np.arange(count) + 1
-    there = np.ones(count, dtype=bool)
-    queue = [(int(begins[i + 1] - begins[i]), i) for i in range(1, count - 1)]
-    queue = [each for each in queue if each[0] < narrowest]
+    count, at = len(begins), begins.tolist()  # single elements of arrays take longer
+    before, behind, there = list(range(-1, count - 1)), list(range(1, count + 1)), [True] * count
+    queue = [(at[i + 1] - at[i], i) for i in range(1, count - 1) if at[i + 1] - at[i] < narrowest]
     heapify(queue)
     while queue:
         width, i = heappop(queue)
-        if not there[i] or before[i] < 0 or behind[i] >= count or begins[behind[i]] - begins[i] != width:
+        if not there[i] or before[i] < 0 or behind[i] >= count or at[behind[i]] - at[i] != width:
             continue  # it is gone, or another one was joined to it
         last, joined, following = before[i], behind[i], behind[behind[i]]
-        there[[i, joined]] = False
+        there[i] = there[joined] = False
         behind[last] = following
         if following < count:
             before[following] = last
-            if before[last] >= 0 and begins[following] - begins[last] < narrowest:
-                heappush(queue, (int(begins[following] - begins[last]), int(last)))
-    return begins[there]
+            if before[last] >= 0 and at[following] - at[last] < narrowest:
+                heappush(queue, (at[following] - at[last], last))
+    return np.asarray(begins[np.array(there, dtype=bool)])
