@@ -47,9 +47,22 @@ def test_a_softer_arm_cuts_less_and_the_force_is_that_of_the_depth_which_is_left
     assert np.linalg.norm(mean) < 0.97 * np.linalg.norm(simulated(direction, give))
 
 
+def sought(*settings):
+    """Return the effect as it is fitted to runs."""
+    model = ForceModel(Cutter(RADIUS, 0.5, evenly_pitched(3)), EdgeLaw())
+    blocks = tuple(SimpleNamespace(setting=one) for one in settings)
+    return fitted_to((OF_SIDE_CUTS,), SimpleNamespace(base=model, blocks=blocks, role=lambda *_: blocks))
+
+
 def test_where_no_wall_gives_way_it_cannot_be_seen():
-    one = SimpleNamespace(setting=setting("down", 0.0))
-    task = SimpleNamespace(base=ForceModel(Cutter(RADIUS, 0.5, evenly_pitched(3)), EdgeLaw()), blocks=(one,))
-    assert fitted_to((OF_SIDE_CUTS,), task) == ((), {})
-    moved = SimpleNamespace(setting=replace(one.setting, give=1e-4))
-    assert fitted_to((OF_SIDE_CUTS,), SimpleNamespace(base=task.base, blocks=(moved,)))[0] == (OF_SIDE_CUTS,)
+    one = setting("down", 0.0)
+    assert sought(one) == ((), {})
+    assert sought(replace(one, give=1e-4))[0] == (OF_SIDE_CUTS,)
+
+
+def test_what_the_arm_may_give_more_counts_as_no_effect():
+    one = setting("down", 0.0)
+    runs = [replace(one, give=give, give_sd=sd) for give, sd in ((3e-4, 4e-5), (-4e-4, 3e-5), (0.0, 0.0))]
+    ((effect,), _) = sought(*runs)
+    assert effect.parameters[0].neutral_sd == pytest.approx(0.1)  # 50 µm of 500 µm
+    assert replace(effect.parameters[0], neutral_sd=0.0) == OF_SIDE_CUTS.parameters[0]
