@@ -153,7 +153,7 @@ def test_lost_motion_is_one_way_beyond_a_fraction_of_the_load(wall):
     beta = np.concatenate([COMPLIANCE, np.zeros(len(base.believed))])
     largest = base.loaded[1]
     for share, passed in ((0.02, 0.1), (0.5, 1.0), (-1.0, -1.0)):
-        way = base._lost(np.full((1, 6), share * largest))[0, 1]
+        way = base.lost(np.full((1, 6), share * largest))[0, 1]
         assert way == pytest.approx(passed * COMPLIANCE[1] * largest, rel=0.02)
     matrix, _ = base.design(wall, np.zeros(0), beta)
     moved = elastic_arm.moves(ARM, wall.setting.commanded[20])[:, 1] @ wall.setting.normal
