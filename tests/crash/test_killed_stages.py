@@ -45,7 +45,7 @@ def kills_survived(undisturbed, stage, folder, step):
     )
 
 
-@pytest.mark.parametrize("stage", STAGES)
+@pytest.mark.parametrize("stage", ["ingest", "loop", "report", "verdict"])
 def test_a_stage_killed_between_two_changes_to_files(undisturbed, stage, tmp_path):
     assert kills_survived(undisturbed, stage, tmp_path, STEP[stage]) >= 2
 

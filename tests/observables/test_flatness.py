@@ -399,20 +399,29 @@ def test_a_face_costs_as_much_as_a_few_search_trees_of_its_points() -> None:
     assert cost_ratio(face, lambda: KDTree(cloud)) < 12.0
 
 
-@pytest.mark.skipif(not SIMULATED.is_dir(), reason="data/raw/irb6640-face is not there")
-def test_the_simulated_plate_shows_how_stiff_the_arm_was_in_the_cut(tmp_path: Path) -> None:
+def simulated_plate(folder: Path) -> Problem:
     """Transients, scatter, correlated noise, registration errors: by a simulator that shares no code."""
     from metro.stages.ingest import ingest
 
-    ingest(SIMULATED, ROOT / "config/cells", tmp_path / "p", {}, "test")
-    batch = read_batch(tmp_path / "p")
-    _, task = observed_problem(batch, Processed(tmp_path / "p"))
+    ingest(SIMULATED, ROOT / "config/cells", folder, {}, "test")
+    return observed_problem(read_batch(folder), Processed(folder))[1]
+
+
+@pytest.mark.skipif(not SIMULATED.is_dir(), reason="data/raw/irb6640-face is not there")
+def test_the_simulated_plate_fits_an_arm_as_stiff_as_it_was_in_the_cut(tmp_path: Path) -> None:
+    task = simulated_plate(tmp_path / "p")
     assert all(isinstance(b.setting, FaceSetting) == (b.role != "calibrate") for b in task.blocks)
     misfit = {
         factor: sum(_misfit(task, factor, run) for run in ("r02", "r03", "r05", "r06"))
         for factor in (0.7, 0.8, 0.9, 1)
     }
     assert min(misfit, key=misfit.__getitem__) == 0.8
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not SIMULATED.is_dir(), reason="data/raw/irb6640-face is not there")
+def test_the_simulated_plate_shows_how_stiff_the_arm_was_in_the_cut(tmp_path: Path) -> None:
+    task = simulated_plate(tmp_path / "p")
     # The force of the base model can stand in for it, and so can masses: far beyond what is believed of them.
     outcome = search(task, library("flatness"), Gates(0.007, 0.004, 0.05, 3.0, 1))
     assert sum(outcome.base.chi2[b.run] for b in task.blocks if b.belief) > 30.0
