@@ -49,6 +49,7 @@ SINGLE = (
     "effects/tool_offset_error.py",
     "robot/kinematics.py",
     "observables/stability/boundary.py",
+    "observables/stability/errors.py",
     "robot/drive_torques.py",
     "robot/presliding.py",
 )

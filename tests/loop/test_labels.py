@@ -137,7 +137,7 @@ def test_an_effect_found_is_told_with_its_size_and_mends_the_held_out_prediction
     assert change(Line()).slope == pytest.approx(0.9, abs=0.3)
 
 
-def test_held_out_tests_that_speak_against_an_effect_are_told_of_and_decide_nothing():
+def test_held_out_tests_that_speak_against_an_effect_name_no_cause_but_something_remains():
     """On whole speeds that no fit has seen, the boundary is that of the base model after all."""
     task = problem(Line(slope=0.9), 1)
     held = np.array(task.roles) == "validate"
@@ -150,10 +150,30 @@ def test_held_out_tests_that_speak_against_an_effect_are_told_of_and_decide_noth
             {"run": np.array(one.runs)[held], "measured": one.unstable[held].astype(float), "before": before}
         ).assign(after=before)
         verdicts.append(in_words(judge_labels(one, rows, [], (SHIFT, SLOPE), GATES)[1]))
-    for key in ("status", "effects", "candidates", "indistinguishable"):
+    for key in ("effects", "candidates", "indistinguishable"):
         assert verdicts[0][key] == verdicts[1][key]
-    assert verdicts[0]["status"] == "explained"
     assert [one["verification"]["holds"] for one in verdicts] == [True, False]
+    assert [one["status"] for one in verdicts] == ["explained", "partly_explained"]
+    assert verdicts[0]["unexplained"] is None
+    tests = verdicts[1]["unexplained"]["signature"]
+    assert re.search(r"\d+ of \d+ held-out tests contradict the predicted boundary: ", tests)
+
+
+def test_a_boundary_that_held_out_tests_contradict_is_not_clean():
+    task = problem(Line(), 3)
+    held = np.array(task.roles) == "validate"
+    against = replace(task, unstable=np.where(held, ~np.asarray(task.unstable, dtype=bool), task.unstable))
+    before = norm.cdf((np.log(task.depth) - Line().boundary(task.point_rpm)[task.point]) / 0.15)[held]
+    said = []
+    for one in (task, against):
+        rows = pd.DataFrame(
+            {"run": np.array(one.runs)[held], "measured": one.unstable[held].astype(float), "before": before}
+        ).assign(after=before)
+        said.append(in_words(judge_labels(one, rows, [], (SHIFT, SLOPE), GATES)[1]))
+    assert [one["status"] for one in said] == ["clean", "unexplained"]
+    assert [one["effects"] for one in said] == [[], []]
+    assert "held-out tests contradict" in said[1]["unexplained"]["signature"]
+    assert "identification" not in said[1]["unexplained"]["signature"]
 
 
 def test_twins_are_undetermined_and_a_next_test_is_named():

@@ -11,6 +11,7 @@ from metro.dynamics.lobes import stability_boundary
 from metro.dynamics.system import Cut, Structure
 from metro.observables.stability.boundary import Cutting
 from metro.observables.stability.cases import NOWHERE, boundaries, cases_of
+from metro.observables.stability.errors import COMMON_SD
 from metro.observables.stability.positions import Tip
 from metro.observables.stability.problem import LabelProblem
 
@@ -63,8 +64,12 @@ def test_a_change_reaches_every_case():
 def test_deviations_are_those_of_what_is_uncertain():
     spread = PROBLEM.deviations(400, 1)
     assert spread.shape == (400, 3)
-    certain = replace(CASES[0], sd=np.zeros_like(CASES[0].sd))
-    np.testing.assert_allclose(certain.deviations(5, 1), 0.0, atol=1e-12)
+    certain = replace(CASES[0], sd=np.zeros_like(CASES[0].sd)).deviations(400, 1)
+    faster = CASES[0].at(CASES[0].rpm / (1 + COMMON_SD))  # all frequencies higher, as if the speed were lower
+    moved = np.abs(
+        boundaries([faster], [lambda model: model])[0] - boundaries([CASES[0]], [lambda model: model])[0]
+    )
+    np.testing.assert_allclose(certain.std(axis=0), moved[0], rtol=0.2)
     coefficients = np.array([0.0] * 6 + [0.03, 0.03])  # both scale the depth together: at least 3 % / sqrt 2
     alone = replace(CASES[0], sd=coefficients).deviations(400, 1).std(axis=0)
     assert np.all((alone > 0.02) & (alone < 0.04))

@@ -9,10 +9,14 @@ from metro.wording.candidates import Sentence
 from metro.wording.names import plain
 
 
-def _wrong_labels(values: JSON) -> str:
+def _wrong_labels(values: JSON, kind: str = "tests") -> str:
     runs = values["runs"]
     named = f": {', '.join(runs)}" if runs else ""
-    return f"{len(runs)} of {values['tests']} tests contradict the predicted boundary{named}"
+    return f"{len(runs)} of {values['tests']} {kind} contradict the predicted boundary{named}"
+
+
+def _wrong_held_out(values: JSON) -> str:
+    return _wrong_labels(values, "held-out tests")
 
 
 def _likeness_of_labels(values: JSON) -> str:
@@ -101,6 +105,7 @@ def _verification_of_labels(values: JSON) -> str:
 
 SENTENCES: Mapping[str, Sentence] = {
     "wrong_labels": _wrong_labels,
+    "wrong_held_out": _wrong_held_out,
     "likeness_of_labels": _likeness_of_labels,
     "lacking": _lacking,
     "test": _test,

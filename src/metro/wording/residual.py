@@ -105,8 +105,15 @@ def _above_floor(values: JSON) -> str:
     )
 
 
+def _held_out_above_floor(values: JSON) -> str:
+    return (
+        f"only on the held-out runs, whose error is {values['ratio']:.2g} times what noise explains "
+        f"({_chance(values['p_value'])}), the largest in {values['condition']}"
+    )
+
+
 def _verification(values: JSON) -> str:
-    """Say how the final model does on the held-out runs; nothing is decided by it."""
+    """Say how the final model does on the held-out runs; no cause is decided by it."""
     runs = f"{values['runs']} held-out run{'s' if values['runs'] > 1 else ''}"
     times = f"{values['ratio']:.2g}"
     size = "as large as that" if times == "1" else f"{times} times that"
@@ -255,6 +262,7 @@ SENTENCES: Mapping[str, Sentence] = {
     "may_be": _may_be,
     "unseen": _unseen,
     "above_floor": _above_floor,
+    "held_out_above_floor": _held_out_above_floor,
     "verification": _verification,
     "noise": _noise,
     "strained": _strained,

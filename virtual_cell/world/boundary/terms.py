@@ -54,7 +54,9 @@ def in_contract_terms(cell: Cell, climbs: Climbs) -> dict[str, list[Term]]:
         if not climbs.turns:
             return by_depth
         line = climbs.rpm / 60.0 / climbs.turns / np.exp(less[1])  # of a spectrum, its width over its place
-        in_hz = np.hypot(line, s.warming)
+        # A frequency is anywhere within a line, as a boundary is between two rungs, and moves by half of what
+        # the stiffness does while the machine warms.
+        in_hz = np.hypot(line, 0.5 * s.warming) / math.sqrt(12.0)
         same = np.abs(does[1] - less[1]) < _OTHER  # at others it is another resonance that rings
         if not same.any():
             return by_depth

@@ -37,6 +37,9 @@ from metro.loop.verdict.verdict import error
 from metro.observables.labelled import Change, Labelled
 from metro.units import JSON, MM
 
+# What the identification tests say, and what is said where held-out tests contradict it.
+REFUTED = {"explained": "partly_explained", "clean": "unexplained"}
+
 
 @dataclass(frozen=True)
 class _Judged:
@@ -44,7 +47,8 @@ class _Judged:
 
     ``rows`` of the held-out tests, ``after`` with what is claimed; ``tests`` of the identification and their
     ``runs``; ``contradiction``: how surprising these are under the hypothesis that leads; ``upstream``
-    whether the effects of the force explain; ``suggested`` tests that could come next.
+    whether the effects of the force explain; ``suggested`` tests that could come next; ``verified``: what the
+    held-out tests say, None without any.
     """
 
     rows: pd.DataFrame
@@ -54,6 +58,7 @@ class _Judged:
     contradiction: float
     upstream: bool
     suggested: list[NextTest]
+    verified: JSON | None = None
 
     @property
     def enough(self) -> bool:
@@ -62,13 +67,19 @@ class _Judged:
 
     @property
     def claimed(self) -> bool:
-        """Whether the lead has passed the gates, its own tests agree, and held-out tests verify it."""
+        """Whether the lead has passed the gates, its own tests agree, and there are tests to verify it."""
         lead = self.outcome.lead if self.outcome else None
         return self.enough and lead is not None and not lead.rejected and self.contradiction >= SIGNIFICANT
 
     @property
     def status(self) -> str:
         """The verdict."""
+        said = self.by_identification
+        return REFUTED.get(said, said) if self.verified and not self.verified["holds"] else said
+
+    @property
+    def by_identification(self) -> str:
+        """The verdict by the identification tests alone."""
         contradicted, outcome = self.contradiction < SIGNIFICANT, self.outcome
         if outcome is None or not self.enough:
             return "insufficient"
@@ -86,7 +97,11 @@ class _Judged:
         parts: list[Statement] = []
         if self.outcome is None:
             return parts
-        if self.status == "unexplained":
+        if self.status != self.by_identification:
+            against = self.rows["run"][np.abs(self.rows["measured"] - self.rows["after"]) > 0.5]
+            values = {"runs": against.tolist(), "tests": len(self.rows)}
+            parts.append(Statement("wrong_held_out", values))
+        if self.by_identification == "unexplained":
             leading = self.outcome.lead or self.outcome.weighed[0]
             probability = predicted(leading.hypothesis, self.tests, self.outcome.evidence.errors)
             wrong = np.flatnonzero(np.abs(self.tests.unstable - probability) > 0.5)
@@ -94,7 +109,7 @@ class _Judged:
                 Statement("wrong_labels", {"runs": [self.runs[i] for i in wrong], "tests": len(self.runs)})
             )
         lacking = self.outcome.elsewhere or self.outcome.doubtful
-        if lacking and self.status in ("unexplained", "undetermined"):
+        if lacking and self.by_identification in ("unexplained", "undetermined"):
             parts.append(_elsewhere(self.outcome))
         return parts
 
@@ -110,8 +125,9 @@ def judge_labels(
 ) -> tuple[pd.DataFrame, JSON, JSON, Change | None]:
     """Judge tests with labels: comparison rows, entries of verdict.json and loop.json, change of the models.
 
-    The tests of the identification decide; those held out verify and decide nothing. The change is that of
-    the claimed effects, to draw the boundary with them; None where there are none.
+    The tests of the identification decide; those held out verify, and name no cause: where they contradict
+    the boundary, the status says that something remains. The change is that of the claimed effects, to draw
+    the boundary with them; None where there are none.
 
     Parameters
     ----------
@@ -134,7 +150,7 @@ def judge_labels(
         "noise_floor": floor,
         "held_out_runs": rows["run"].tolist(),
         **figures,
-        "verification": _verified(task, judged, gates) if len(rows) else None,
+        "verification": judged.verified,
         "effects": (upstream if judged.upstream else []) + _effects(judged),
         "candidates": _candidates(judged),
         "indistinguishable": pairs(judged.outcome) if judged.outcome else [],
@@ -158,13 +174,16 @@ def _judged(
     tests, runs = tests_of(task, "identify")
     outcome = search_labels(task, library, gates) if enough(tests) else None
     if outcome is None:
-        return _Judged(rows, None, tests, runs, 1.0, False, [])
+        verified = verification(rows, gates) if len(rows) else None
+        return _Judged(rows, None, tests, runs, 1.0, False, [], verified)
     leading = outcome.lead or outcome.weighed[0]
     contradiction = surprise(tests, leading.hypothesis, outcome.evidence.errors, gates.seed)
     upstream = first is not None and contradiction >= SIGNIFICANT > _without_upstream(first, gates)
     suggested = next_tests(task, outcome) if outcome.lead or len(rows) < LEAST_TESTS else []
     judged = _Judged(rows, outcome, tests, runs, contradiction, upstream and not outcome.lead, suggested)
-    return replace(judged, rows=_with_effects(task, rows, outcome)) if judged.claimed else judged
+    if judged.claimed:
+        judged = replace(judged, rows=_with_effects(task, rows, outcome))
+    return replace(judged, verified=_verified(task, judged, gates)) if len(rows) else judged
 
 
 def _without_upstream(first: Labelled, gates: Gates) -> float:
@@ -176,7 +195,8 @@ def _without_upstream(first: Labelled, gates: Gates) -> float:
 
 def _verified(task: Labelled, judged: _Judged, gates: Gates) -> JSON:
     """Compare the held-out tests with what is predicted of them, by the hypothesis that is claimed if any."""
-    if judged.outcome is None or judged.upstream:  # else the force's effects predict them
+    assert judged.outcome is not None
+    if judged.upstream:  # the force's effects predict them
         return verification(judged.rows, gates)
     lead = judged.outcome.lead if judged.claimed else None
     return verification(judged.rows, gates, of_hypotheses(task, judged.outcome, lead, gates))

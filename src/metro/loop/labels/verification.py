@@ -1,4 +1,4 @@
-"""Verification by labels: how surprising the held-out tests are, which decides nothing."""
+"""Verification by labels: how surprising the held-out tests are, which decides no cause."""
 
 from __future__ import annotations
 

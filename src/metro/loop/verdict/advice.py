@@ -8,7 +8,7 @@ from metro.loop.planning.experiment import Prospect, best_view, prospects
 from metro.loop.search.outcome import Outcome
 from metro.loop.search.rivals import Rival
 from metro.loop.statement import Statement
-from metro.loop.verdict.residual import LEAST_RUNS, Residual, largest_residual
+from metro.loop.verdict.residual import LEAST_RUNS, Residual
 from metro.observables.problem import Problem, Proposal
 
 WORTH = 0.5  # probability of deciding below which a run is not worth naming
@@ -22,8 +22,8 @@ def next_experiment(problem: Problem, outcome: Outcome, residual: Residual) -> S
     if outcome.rivals:
         return to_decide(problem, outcome)
     if residual.parts:
-        worst = largest_residual(residual.fit).condition
-        return Statement("describe", {"condition": worst, "residual": residual.statement})
+        values = {"condition": residual.condition, "residual": residual.statement}
+        return Statement("describe", values)
     if outcome.not_visible:
         return _to_show(problem, outcome)
     return None

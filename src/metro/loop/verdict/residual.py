@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from metro.effects.effect import Effect
-from metro.loop.checks.floor import ABOVE, against_floor
+from metro.loop.checks.floor import ABOVE, AgainstFloor, against_floor
 from metro.loop.checks.left_out import unseen
 from metro.loop.checks.signature import Line, places, unseen_signature
 from metro.loop.fitting.fit import Fit
@@ -24,11 +24,18 @@ class Residual:
     """The significant residual: its ``parts``, one statement each, none where nothing significant remains.
 
     ``lines`` are those that it was seen in: of conditions left out of the fit where it shows in these alone.
+    ``held_out``: the error of the held-out runs where it shows in none but these.
     """
 
     parts: tuple[Statement, ...]
     fit: Fit
     lines: tuple[Line, ...]
+    held_out: AgainstFloor | None = None
+
+    @property
+    def condition(self) -> str:
+        """The condition in which it is largest."""
+        return self.held_out.condition if self.held_out else largest_residual(self.fit).condition
 
     @property
     def statement(self) -> Statement:
@@ -42,10 +49,7 @@ def enough_runs(problem: Problem) -> bool:
 
 
 def residual_of(problem: Problem, outcome: Outcome, gates: Gates) -> Residual:
-    """Return what remains on the runs of the fit, if only where their condition is left out of it.
-
-    The runs that verify are not read: their errors decide nothing.
-    """
+    """Return what remains on the runs of the fit, if only where their condition is left out of it."""
     parts = remaining(outcome)
     astray = unsettled(outcome.final)
     if astray:  # nothing is claimed of it, least of all that nothing remains
@@ -53,7 +57,7 @@ def residual_of(problem: Problem, outcome: Outcome, gates: Gates) -> Residual:
     if parts or not enough_runs(problem):
         return Residual(parts, outcome.final, outcome.lines)
     scored = unseen(outcome.final, outcome.prior)
-    least = problem.least_residual(max(gates.materiality, gates.model_form_budget))
+    least = least_residual(problem, gates)
     lines = tuple(line for line in unseen_signature(scored, least) if line.significant)
     if seen := places(lines):
         return Residual((Statement("unseen", {"places": seen}),), outcome.final, lines)
@@ -61,6 +65,18 @@ def residual_of(problem: Problem, outcome: Outcome, gates: Gates) -> Residual:
     if error and error.p_value < ABOVE and error.relative > least:
         return Residual((Statement("above_floor", vars(error)),), outcome.final, outcome.lines)
     return Residual((), outcome.final, outcome.lines)
+
+
+def least_residual(problem: Problem, gates: Gates) -> float:
+    """Return the share of the signal below which a residual counts for nothing."""
+    return problem.least_residual(max(gates.materiality, gates.model_form_budget))
+
+
+def with_held_out(residual: Residual, error: AgainstFloor | None, least: float) -> Residual:
+    """Add what the held-out runs alone show: an error beyond chance, and beyond ``least`` of the signal."""
+    if residual.parts or error is None or error.p_value >= ABOVE or error.relative <= least:
+        return residual
+    return replace(residual, parts=(Statement("held_out_above_floor", vars(error)),), held_out=error)
 
 
 def remaining(outcome: Outcome) -> tuple[Statement, ...]:

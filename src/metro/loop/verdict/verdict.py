@@ -16,8 +16,8 @@ from metro.loop.search.outcome import Outcome
 from metro.loop.search.trial import Gates, Trial
 from metro.loop.statement import Statement
 from metro.loop.verdict.advice import more_runs, next_experiment
-from metro.loop.verdict.residual import Residual, enough_runs, residual_of
-from metro.loop.verdict.verification import verification
+from metro.loop.verdict.residual import Residual, enough_runs, least_residual, residual_of, with_held_out
+from metro.loop.verdict.verification import held_out_error, verification
 from metro.observables.problem import Problem
 from metro.observables.quantity import quantity
 from metro.units import JSON, Array
@@ -55,9 +55,12 @@ def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) 
     """Return the observable's entry of verdict.json, with statements where that has sentences."""
     floor = float(np.sqrt((rows["sigma"] ** 2).mean())) if len(rows) else math.nan
     enough = enough_runs(problem)
+    error_held_out = held_out_error(problem, outcome)
     residual = residual_of(problem, outcome, gates)
+    if enough:
+        residual = with_held_out(residual, error_held_out, least_residual(problem, gates))
     claimed = outcome.names if enough else ()  # what no held-out run has tested is not claimed
-    verified = verification(problem, outcome, rows) if len(rows) else None
+    verified = verification(problem, outcome, rows, error_held_out) if error_held_out else None
     before, after = (
         widened(error(rows, name, gates.seed), verified["freedom"]) if verified else None
         for name in ("before", "after")
@@ -235,6 +238,7 @@ def finite(value: float) -> float | None:
 def _unexplained(problem: Problem, outcome: Outcome, rows: pd.DataFrame, residual: Residual) -> JSON:
     """Return the residual; its size is the share left on the runs that show it, of the held-out signal."""
     whole = [abs(change.relative) for change in (outcome.step, outcome.between, outcome.restless) if change]
+    whole += [residual.held_out.relative] if residual.held_out else []
     lines = residual.lines
     share = max(share_left(lines), *whole) if whole else share_left(lines)
     over = share * float(np.sqrt((rows["measured"] ** 2).mean())) if len(rows) and share else None

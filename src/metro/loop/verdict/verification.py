@@ -1,13 +1,14 @@
 """Verification: the final model on the runs that neither a fit nor a decision has seen.
 
-What is found here is stated and decides nothing: which effects are named, and the status, are settled before.
+Which effects are named, and how surely, is settled before: these runs decide no cause. Where they contradict
+the model, nobody may say that nothing remains, and the status says so.
 """
 
 from __future__ import annotations
 
 import pandas as pd
 
-from metro.loop.checks.floor import ABOVE, against_floor
+from metro.loop.checks.floor import ABOVE, AgainstFloor, against_floor
 from metro.loop.checks.left_out import scored_unseen, unseen
 from metro.loop.search.outcome import Outcome
 from metro.loop.search.settled import beyond
@@ -19,8 +20,21 @@ WHENS = ("before", "after")
 WORSE = 1.1  # times the error without effects: a run that is predicted worse with them by more is named
 
 
-def verification(problem: Problem, outcome: Outcome, rows: pd.DataFrame) -> JSON:
-    """Compare the errors on the held-out runs with the noise floor, and with those without any effect.
+def held_out_error(problem: Problem, outcome: Outcome) -> AgainstFloor | None:
+    """Compare the error of the final model on the held-out runs with the noise floor; None without any."""
+    groups: dict[str, list[Block]] = {}
+    for block in problem.role("validate"):
+        groups.setdefault(block.condition, []).append(block)
+    scored = [scored_unseen(outcome.final, blocks) for blocks in groups.values()]
+    return against_floor(scored, noise_scale(outcome))
+
+
+def verification(problem: Problem, outcome: Outcome, rows: pd.DataFrame, error: AgainstFloor) -> JSON:
+    """Say how the final model does on the held-out runs, and whether better than without any effect.
+
+    Parameters
+    ----------
+    rows : of the comparison. error : of :func:`held_out_error`.
 
     Returns
     -------
@@ -29,19 +43,13 @@ def verification(problem: Problem, outcome: Outcome, rows: pd.DataFrame) -> JSON
         independent values it is the mean, ``p_value`` of one as large by noise alone, ``holds``: whether it
         is not beyond chance, ``worse_runs`` that the effects make worse, ``words``: all that as a statement.
     """
-    groups: dict[str, list[Block]] = {}
-    for block in problem.role("validate"):
-        groups.setdefault(block.condition, []).append(block)
-    scored = [scored_unseen(outcome.final, blocks) for blocks in groups.values()]
-    error = against_floor(scored, noise_scale(outcome))
-    assert error is not None  # there are rows
     holds = error.p_value >= ABOVE
     worse = _worse(rows) if outcome.names else []
     before, after = (float(((rows["measured"] - rows[when]) ** 2).mean() ** 0.5) for when in WHENS)
     without = beyond(outcome.final, problem.role("validate"))
     values = {
         "runs": len(problem.role("validate")),
-        "conditions": len(groups),
+        "conditions": len({block.condition for block in problem.role("validate")}),
         "ratio": error.ratio,
         "p_value": error.p_value,
         "holds": holds,

@@ -16,6 +16,7 @@ from metro.dynamics.by_depth import boundary_of_edge
 from metro.dynamics.stability_model import StabilityModel
 from metro.observables.stability import boundary as stability
 from metro.observables.stability.boundary import Cutting
+from metro.observables.stability.errors import deviations
 from metro.observables.stability.positions import Tip
 from metro.units import Array
 
@@ -49,12 +50,10 @@ class Case:
 
     def deviations(self, draws: int, seed: int) -> Array:
         """Draws (draws, k) of the depth's logarithm from the errors of modes and coefficients."""
-        rng = np.random.default_rng(seed)
-        normal = rng.normal(size=(draws, len(self.sd))) * np.where(np.isfinite(self.sd), self.sd, 0.0)
-        structure = self.model.structure
+        errors, structure = deviations(self.sd, draws, seed), self.model.structure
         solved = [boundary_of_edge(structure, cut, self.rpm) for cut in self.model.cuts]
         lowest = np.min([one.depth for one in solved], axis=0)
-        sampled = np.min([one.samples(structure, normal) for one in solved], axis=0)
+        sampled = np.min([one.samples(structure, errors) for one in solved], axis=0)
         known = np.isfinite(lowest) & np.isfinite(sampled)
         return np.log(np.where(known, sampled, 1.0) / np.where(known, lowest, 1.0))
 

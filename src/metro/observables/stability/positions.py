@@ -11,6 +11,7 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.batch.capabilities import plural
 from metro.dynamics.system import Structure
+from metro.observables.stability.errors import frequency_sd
 from metro.robot.stations import Stations, leave_one_out, stiffness_at
 from metro.units import MM, Array
 
@@ -77,6 +78,7 @@ def _tip(position: str, rows: pd.DataFrame, letters: np.ndarray) -> Tip:
         ("stiffness_sd", "stiffness_n_m"),
     )
     relative = [rows[sd].to_numpy(float) / rows[value].to_numpy(float) for sd, value in pairs]
+    relative[0] = frequency_sd(relative[0], structure.stiffness / structure.omega**2)
     counted = [f"{d}{1 + int(np.sum(letters[:i] == d))}" for i, d in enumerate(letters)]
     names = tuple(rows["mode"].astype(str)) if followed else tuple(counted)
     return Tip(position, structure, names, np.concatenate(relative))
