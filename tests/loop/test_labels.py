@@ -150,8 +150,13 @@ def test_held_out_tests_that_speak_against_an_effect_name_no_cause_but_something
             {"run": np.array(one.runs)[held], "measured": one.unstable[held].astype(float), "before": before}
         ).assign(after=before)
         verdicts.append(in_words(judge_labels(one, rows, [], (SHIFT, SLOPE), GATES)[1]))
-    for key in ("effects", "candidates", "indistinguishable"):
+    for key in ("candidates", "indistinguishable"):
         assert verdicts[0][key] == verdicts[1][key]
+    (surely,), (less,) = (one["effects"] for one in verdicts)
+    assert (surely["effect"], surely["parameters"]) == (less["effect"], less["parameters"])
+    assert verdicts[1]["after"]["rms"] > verdicts[1]["before"]["rms"]  # it explains nothing of these
+    assert (surely["probability"] > 0.95, less["probability"]) == (True, 0.0)
+    assert "0 % of the residual of the held-out runs" in less["lowered"]
     assert [one["verification"]["holds"] for one in verdicts] == [True, False]
     assert [one["status"] for one in verdicts] == ["explained", "partly_explained"]
     assert verdicts[0]["unexplained"] is None

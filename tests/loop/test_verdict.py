@@ -124,13 +124,23 @@ def test_runs_that_verify_name_no_cause_and_where_they_contradict_something_rema
     before = closed(task, (BEND,))[2]
     after = closed(with_spike_where_unseen(task), (BEND,))[2]
     told = ("noise_floor", "before", "after", "verification", "candidates")
-    told += ("status", "unexplained", "next_experiment", "traces")
+    told += ("status", "unexplained", "next_experiment", "traces", "effects")
     decided = [
         {name: value for name, value in verdict.items() if name not in told} for verdict in (before, after)
     ]
     assert decided[0] == decided[1]
     assert [verdict["status"] for verdict in (before, after)] == statuses
     assert before["unexplained"] is None
+    found = [{**one, "probability": 0.0, "lowered": ""} for one in before["effects"]]
+    assert found == [{**one, "probability": 0.0, "lowered": ""} for one in after["effects"]]
+    whole, left = (after[when]["rms"] ** 2 - after["noise_floor"] ** 2 for when in ("before", "after"))
+    for surely, less in zip(before["effects"], after["effects"], strict=True):
+        assert "lowered" not in surely
+        assert less["probability"] == pytest.approx(surely["probability"] * (1.0 - left / whole))
+        assert 0.05 < less["probability"] < 0.95
+        share = f"{100 * (1.0 - left / whole):.0f} % of the residual of the held-out runs"
+        assert share in less["lowered"]
+    assert after["unexplained"]["held_out_only"] is True
     times, where = after["verification"]["ratio"], after["unexplained"]["signature"]
     assert where.startswith(
         f"only on the held-out runs, whose error is {times:.2g} times what noise explains"
@@ -166,8 +176,9 @@ def test_permuted_data_of_the_runs_that_verify_change_no_fit_and_no_search(order
     assert outcomes[0].names == outcomes[1].names == ("bend",)
     np.testing.assert_array_equal(outcomes[0].final.theta, outcomes[1].final.theta)
     np.testing.assert_array_equal(outcomes[0].final.beta, outcomes[1].final.beta)
-    for key in ("effects", "indistinguishable"):
-        assert verdicts[0][key] == verdicts[1][key]
+    assert verdicts[0]["indistinguishable"] == verdicts[1]["indistinguishable"]
+    parameters = [[one["parameters"] for one in verdict["effects"]] for verdict in verdicts]
+    assert parameters[0] == parameters[1]
     remains = verdicts[1]["unexplained"] is not None
     assert verdicts[1]["status"] == ("partly_explained" if remains else "explained")
     assert not (remains and verdicts[1]["verification"]["holds"])

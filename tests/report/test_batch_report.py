@@ -189,6 +189,20 @@ def test_a_change_that_is_smaller_than_what_is_printed_is_no_fall():
     assert "The identification runs alone show what was found." in said
 
 
+@pytest.mark.parametrize("status", ["unexplained", "partly_explained"])
+def test_an_error_of_the_held_out_runs_alone_is_not_said_to_be_in_the_others(status):
+    verification = {"ratio": 3.0, "holds": False, "words": "Verification contradicts the model."}
+    for alone in (True, False):
+        rest = synthetic.REST | ({"held_out_only": True} if alone else {})
+        effects = [] if status == "unexplained" else [synthetic.RUNOUT]
+        entry = synthetic.observable(status, verification=verification, unexplained=rest, effects=effects)
+        said = verdict_words("force", entry)
+        contradicted = "explains the identification runs, but the held-out runs contradict it" in said
+        assert contradicted is (alone and status == "unexplained")
+        assert ("Remaining error: grows along the path." in said) is alone
+        assert ("error of the identification runs: grows along the path." in said) is not alone
+
+
 def test_where_nothing_was_added_it_is_said_what_changed_the_error():
     fell = verdict_words("lobes", synthetic.observable("insufficient", before=0.34, after=0.23, unit="1"))
     assert "with the effects found in other observables" in fell

@@ -34,12 +34,11 @@ def _places(values: JSON) -> str:
 
 def _lowered(values: JSON) -> str:
     name = plain(values["effect"])
+    whose = "residual of the held-out runs" if values.get("held_out") else "residual"
     return (
         f"{name[:1].upper()}{name[1:]} has a weight of {values['weight']:.2f} among the effects of the "
-        "library. "
-        f"Its probability is lower because it explains only {100 * values['explained']:.0f} % of the "
-        "residual; "
-        "an unknown cause may have the same signature"
+        f"library. Its probability is lower because it explains only {100 * values['explained']:.0f} % of "
+        f"the {whose}; an unknown cause may have the same signature"
     )
 
 

@@ -17,7 +17,7 @@ from metro.loop.search.trial import Gates, Trial
 from metro.loop.statement import Statement
 from metro.loop.verdict.advice import more_runs, next_experiment
 from metro.loop.verdict.residual import Residual, enough_runs, least_residual, residual_of, with_held_out
-from metro.loop.verdict.verification import held_out_error, verification
+from metro.loop.verdict.verification import contradicted, held_out_error, verification
 from metro.observables.problem import Problem
 from metro.observables.quantity import quantity
 from metro.units import JSON, Array
@@ -67,7 +67,7 @@ def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) 
     )
     status = _status(outcome, bool(residual.parts), enough)
     below = traces(outcome, gates.materiality) if status in SETTLED else None
-    return {
+    verdict = {
         "status": status,
         "unit": problem.unit,
         "noise_floor": floor if math.isfinite(floor) else None,
@@ -86,6 +86,7 @@ def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) 
         "unexplained": _unexplained(problem, outcome, rows, residual) if residual.parts else None,
         **({"traces": below} if below else {}),
     }
+    return contradicted(verdict) if residual.held_out else verdict
 
 
 def traces(outcome: Outcome, materiality: float) -> Statement | None:

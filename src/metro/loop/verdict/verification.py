@@ -1,7 +1,7 @@
 """Verification: the final model on the runs that neither a fit nor a decision has seen.
 
-Which effects are named, and how surely, is settled before: these runs decide no cause. Where they contradict
-the model, nobody may say that nothing remains, and the status says so.
+Which effects are named is settled before: these runs decide no cause. Where they contradict the model, the
+status says that something remains, and effects are believed as far as they explain these runs.
 """
 
 from __future__ import annotations
@@ -67,6 +67,26 @@ def verification(problem: Problem, outcome: Outcome, rows: pd.DataFrame, error: 
         "worse_runs": worse,
         "words": Statement("verification", values),
     }
+
+
+def contradicted(verdict: JSON) -> JSON:
+    """Believe the effects of a verdict no more than they explain of the held-out runs, which contradict it.
+
+    As a residual of the identification runs does, theirs may be of an unknown cause of the same signature.
+    """
+    noise = verdict["noise_floor"] or 0.0
+    whole, left = (max(0.0, verdict[when]["rms"] ** 2 - noise**2) for when in WHENS)
+    explained = 1.0 - min(1.0, left / whole) if whole else 0.0
+    effects = [
+        {**one, "probability": one["probability"] * explained, "lowered": _lowered(one, explained)}
+        for one in verdict["effects"]
+    ]
+    return {**verdict, "effects": effects, "unexplained": {**verdict["unexplained"], "held_out_only": True}}
+
+
+def _lowered(effect: JSON, explained: float) -> Statement:
+    values = {"effect": effect["effect"], "weight": effect["probability"], "explained": explained}
+    return Statement("lowered", {**values, "held_out": True})
 
 
 def noise_scale(outcome: Outcome) -> float:

@@ -38,8 +38,8 @@ def verdict_words(observable: str, entry: JSON, left: str = "") -> str:
         "partly_explained": f"{start}: {part} {tested} A significant residual remains. "
         f"{_residual(entry, left)}",
         "undetermined": f"{start}: {_undetermined(entry)} {_rivals(entry)}{tested}",
-        "unexplained": f"{start}: over the identification runs the base model has a significant error that "
-        f"no effect of the library explains. {tested}{_unconfirmed(entry)} {_residual(entry, left)}",
+        "unexplained": f"{start}: {_unexplained(entry)} {tested}{_unconfirmed(entry)} "
+        f"{_residual(entry, left)}",
         "insufficient": f"{start}: there are too few identification runs to decide whether an effect is "
         f"missing. {tested}",
     }
@@ -61,6 +61,23 @@ def _clean(entry: JSON) -> str:
             f"the base model explains the identification runs; no larger effect is missing. {entry['traces']}"
         )
     return "the base model explains the identification runs; no effect is missing."
+
+
+def _unexplained(entry: JSON) -> str:
+    """Say which runs have an error that nothing explains."""
+    if _held_out_only(entry):
+        return (
+            "the base model explains the identification runs, but the held-out runs contradict it. No cause "
+            "is sought in held-out runs."
+        )
+    return (
+        "over the identification runs the base model has a significant error that no effect of the library "
+        "explains."
+    )
+
+
+def _held_out_only(entry: JSON) -> bool:
+    return bool((entry.get("unexplained") or {}).get("held_out_only"))
 
 
 def _unconfirmed(entry: JSON) -> str:
@@ -197,6 +214,8 @@ def _residual(entry: JSON, left: str) -> str:
     unexplained = entry.get("unexplained") or {}
     if not unexplained.get("signature"):
         return ""
+    if _held_out_only(entry):
+        return f"Remaining error: {plain(str(unexplained['signature']))}."
     return f"Remaining error of the identification runs: {left or plain(str(unexplained['signature']))}."
 
 
