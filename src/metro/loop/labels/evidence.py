@@ -27,7 +27,7 @@ _ERRORS = np.linspace(-6.0, 6.0, 61)  # of a speed, in standard deviations
 _GRID, _BEYOND = 200, 4.0  # depths of the table, to so many standard deviations beyond the tests
 # Chatter frequencies: standard deviation of the logarithm, share of those that follow no model (another mode,
 # once chatter is full grown), and the width over which these spread.
-FREQUENCY_SD, STRAY, STRAY_WIDTH = 0.07, 0.2, 3.0
+FREQUENCY_SD, STRAY, STRAY_WIDTH = 0.02, 0.2, 3.0
 # Which line is the loudest: teeth that leave the cut modulate the vibration, so that it has lines at its own
 # frequency and at so many tooth frequencies from that (Insperger et al. 2003, Int. J. Mach. Tools Manuf. 43,
 # 25). Shares of the frequencies heard that follow the model.
