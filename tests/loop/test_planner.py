@@ -51,6 +51,19 @@ def test_a_rest_that_nothing_explains_is_described_by_the_condition_that_shows_i
     assert kind.proposal.blocks[0].condition == kind.proposal.words
 
 
+def test_what_the_held_out_runs_alone_show_is_described_by_their_condition():
+    task = replace(problem(5), feasible=PROPOSALS)
+    blocks = tuple(
+        replace(one, measured=1.3 * one.measured) if one.role == "validate" else one for one in task.blocks
+    )
+    (aim,) = planned(replace(task, blocks=blocks), (BEND, RIPPLE))
+    assert aim.question == "describe"
+    assert "only on the held-out runs" in in_words(aim.states)
+    (kind,) = aim.kinds
+    assert kind.proposal.made[0].like in {each.run for each in task.role("validate")}
+    assert kind.proposal.blocks[0].condition == kind.proposal.words
+
+
 def test_nothing_is_open_where_the_base_model_is_right_and_known():
     task = replace(problem(5), feasible=PROPOSALS)
     assert planned(task, (BEND, RIPPLE)) == []

@@ -17,7 +17,8 @@ from metro.loop.search.outcome import Outcome
 from metro.loop.search.trial import Gates
 from metro.loop.statement import Statement
 from metro.loop.verdict.advice import more_runs, to_decide
-from metro.loop.verdict.residual import LEAST_RUNS, enough_runs, largest_residual, residual_of
+from metro.loop.verdict.residual import LEAST_RUNS, enough_runs, residual_of
+from metro.loop.verdict.verification import held_out_error
 from metro.observables.problem import Block, Made, Problem, Proposal
 from metro.units import JSON
 
@@ -59,9 +60,9 @@ def aims(problem: Problem, outcome: Outcome, gates: Gates, most: int) -> list[Ai
         return [_enough(problem)]
     if outcome.rivals:
         return [_decide(problem, outcome, gates, most)]
-    residual = residual_of(problem, outcome, gates)
+    residual = residual_of(problem, outcome, gates, held_out_error(problem, outcome))
     if residual.parts:
-        again = _repeated(largest_residual(residual.fit), min(AGAIN, most))
+        again = _repeated(residual.worst(problem), min(AGAIN, most))
         condition = {"condition": again.proposal.words, "residual": residual.statement}
         return [Aim("describe", Statement("describe_again", condition), (again,))]
     showing = [*_show(problem, outcome, most)]

@@ -22,7 +22,7 @@ def next_experiment(problem: Problem, outcome: Outcome, residual: Residual) -> S
     if outcome.rivals:
         return to_decide(problem, outcome)
     if residual.parts:
-        values = {"condition": residual.condition, "residual": residual.statement}
+        values = {"condition": residual.worst(problem).condition, "residual": residual.statement}
         return Statement("describe", values)
     if outcome.not_visible:
         return _to_show(problem, outcome)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from metro.effects.effect import Effect
 from metro.loop.checks.floor import ABOVE, AgainstFloor, against_floor
@@ -32,10 +32,11 @@ class Residual:
     lines: tuple[Line, ...]
     held_out: AgainstFloor | None = None
 
-    @property
-    def condition(self) -> str:
-        """The condition in which it is largest."""
-        return self.held_out.condition if self.held_out else largest_residual(self.fit).condition
+    def worst(self, problem: Problem) -> Block:
+        """Return a run of the condition in which it is largest."""
+        if self.held_out is None:
+            return _largest(self.fit)
+        return next(b for b in problem.role("validate") if b.condition == self.held_out.condition)
 
     @property
     def statement(self) -> Statement:
@@ -48,8 +49,11 @@ def enough_runs(problem: Problem) -> bool:
     return len(problem.role("identify")) >= LEAST_RUNS and bool(problem.role("validate"))
 
 
-def residual_of(problem: Problem, outcome: Outcome, gates: Gates) -> Residual:
-    """Return what remains on the runs of the fit, if only where their condition is left out of it."""
+def residual_of(problem: Problem, outcome: Outcome, gates: Gates, held_out: AgainstFloor | None) -> Residual:
+    """Return what remains on the runs of the fit, or where their condition is left out of it.
+
+    Where nothing does, return what the held-out runs show, whose error is ``held_out``; None: there are none.
+    """
     parts = remaining(outcome)
     astray = unsettled(outcome.final)
     if astray:  # nothing is claimed of it, least of all that nothing remains
@@ -57,26 +61,17 @@ def residual_of(problem: Problem, outcome: Outcome, gates: Gates) -> Residual:
     if parts or not enough_runs(problem):
         return Residual(parts, outcome.final, outcome.lines)
     scored = unseen(outcome.final, outcome.prior)
-    least = least_residual(problem, gates)
+    least = problem.least_residual(max(gates.materiality, gates.model_form_budget))
     lines = tuple(line for line in unseen_signature(scored, least) if line.significant)
     if seen := places(lines):
         return Residual((Statement("unseen", {"places": seen}),), outcome.final, lines)
     error = against_floor(scored)
     if error and error.p_value < ABOVE and error.relative > least:
         return Residual((Statement("above_floor", vars(error)),), outcome.final, outcome.lines)
+    if held_out and held_out.p_value < ABOVE and held_out.relative > least:
+        words = Statement("held_out_above_floor", vars(held_out))
+        return Residual((words,), outcome.final, outcome.lines, held_out)
     return Residual((), outcome.final, outcome.lines)
-
-
-def least_residual(problem: Problem, gates: Gates) -> float:
-    """Return the share of the signal below which a residual counts for nothing."""
-    return problem.least_residual(max(gates.materiality, gates.model_form_budget))
-
-
-def with_held_out(residual: Residual, error: AgainstFloor | None, least: float) -> Residual:
-    """Add what the held-out runs alone show: an error beyond chance, and beyond ``least`` of the signal."""
-    if residual.parts or error is None or error.p_value >= ABOVE or error.relative <= least:
-        return residual
-    return replace(residual, parts=(Statement("held_out_above_floor", vars(error)),), held_out=error)
 
 
 def remaining(outcome: Outcome) -> tuple[Statement, ...]:
@@ -113,7 +108,7 @@ def _values(effect: Effect, theta: Array) -> list[JSON]:
     ]
 
 
-def largest_residual(fitted: Fit) -> Block:
+def _largest(fitted: Fit) -> Block:
     """Return a run of the condition whose residual is largest against the noise."""
     chi2: dict[str, float] = {}
     elements: dict[str, int] = {}

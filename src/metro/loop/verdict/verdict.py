@@ -16,7 +16,7 @@ from metro.loop.search.outcome import Outcome
 from metro.loop.search.trial import Gates, Trial
 from metro.loop.statement import Statement
 from metro.loop.verdict.advice import more_runs, next_experiment
-from metro.loop.verdict.residual import Residual, enough_runs, least_residual, residual_of, with_held_out
+from metro.loop.verdict.residual import Residual, enough_runs, residual_of
 from metro.loop.verdict.verification import contradicted, held_out_error, verification
 from metro.observables.problem import Problem
 from metro.observables.quantity import quantity
@@ -56,9 +56,7 @@ def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) 
     floor = float(np.sqrt((rows["sigma"] ** 2).mean())) if len(rows) else math.nan
     enough = enough_runs(problem)
     error_held_out = held_out_error(problem, outcome)
-    residual = residual_of(problem, outcome, gates)
-    if enough:
-        residual = with_held_out(residual, error_held_out, least_residual(problem, gates))
+    residual = residual_of(problem, outcome, gates, error_held_out)
     claimed = outcome.names if enough else ()  # what no held-out run has tested is not claimed
     verified = verification(problem, outcome, rows, error_held_out) if error_held_out else None
     before, after = (
