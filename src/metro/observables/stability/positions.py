@@ -25,7 +25,8 @@ class Tip:
     position : its name; the part before "/" is the pose.
     structure : modes in x and in y (or z in its place).
     names : (m,) direction and number of each mode, "x1": the same mode has the same name at every position.
-    sd : (3 m,) standard deviations of the logarithms of omega, zeta, stiffness.
+    sd : (3 m,) standard deviations of the logarithms of omega, zeta, stiffness; of omega also by what no
+        scatter shows (:func:`metro.observables.stability.errors.frequency_sd`).
     interpolated : whether the modes are those of other positions, interpolated.
     """
 
