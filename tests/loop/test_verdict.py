@@ -15,13 +15,16 @@ from toy import ANGLE, BEND, BETA, GATES, POINTS, RIPPLE, SIGMA, TWIN, Wave, pro
 from worded import in_words
 
 from metro.effects.effect import EffectParameter
+from metro.loop.checks.floor import AgainstFloor
 from metro.loop.checks.signature import Line, share_left
 from metro.loop.fitting.held_out import COMPARISON, comparison, held_out, identified_fit, run_dof
 from metro.loop.search.search import search
 from metro.loop.statement import Statement
 from metro.loop.verdict.believable import contradicted
+from metro.loop.verdict.residual import residual_of
 from metro.loop.verdict.story import story
 from metro.loop.verdict.verdict import bounded, error, judge, traces, widened
+from metro.loop.verdict.verification import lowered_by_held_out
 from metro.report.sections.verdict import verdict_words
 from metro.wording.batch import STATUSES as SENTENCES
 from metro.wording.batch import verdict_in_words
@@ -156,6 +159,25 @@ def test_runs_that_verify_name_no_cause_and_where_they_contradict_something_rema
         check_entry(verdict)
     assert after["verification"]["ratio"] > 5.0 * before["verification"]["ratio"]
     assert after["after"]["rms"] == pytest.approx(0.3 * BETA[1] / np.sqrt(2), rel=0.1)
+
+
+@pytest.mark.parametrize(("p_value", "relative"), [(0.02, 0.3), (1e-4, 0.001)])
+def test_an_error_of_held_out_runs_that_chance_makes_or_that_is_small_is_none(p_value, relative):
+    task = problem(2, phased=False)
+    outcome = search(task, (BEND,), GATES)
+    feed = task.role("validate")[-1].condition
+    error = AgainstFloor(ratio=1.5, freedom=9.0, p_value=p_value, relative=relative, condition=feed)
+    assert not residual_of(task, outcome, GATES, error).parts
+    seen = residual_of(task, outcome, GATES, replace(error, p_value=1e-4, relative=0.3))
+    assert [part.code for part in seen.parts] == ["held_out_above_floor"]
+    assert seen.worst(task).condition == feed != task.role("validate")[0].condition
+
+
+@pytest.mark.parametrize(("after", "explained"), [(0.1, 1.0), (0.5, 1 - 0.24 / 0.99), (3.0, 0.0)])
+def test_an_effect_is_believed_as_far_as_it_explains_the_held_out_runs(after, explained):
+    entry = {"noise_floor": 0.1, "before": {"rms": 1.0}, "after": {"rms": after}, "unexplained": {"rms": 1.0}}
+    (effect,) = lowered_by_held_out({**entry, "effects": [{"effect": "bend", "probability": 0.9}]})["effects"]
+    assert effect["probability"] == pytest.approx(0.9 * explained)
 
 
 @given(st.permutations(range(4)), st.floats(-3.0, 3.0))

@@ -34,7 +34,7 @@ from metro.loop.search.trial import Gates
 from metro.loop.statement import Statement
 from metro.loop.verdict.story import MOST_PROPOSALS
 from metro.loop.verdict.verdict import error
-from metro.loop.verdict.verification import contradicted
+from metro.loop.verdict.verification import lowered_by_held_out
 from metro.observables.labelled import Change, Labelled
 from metro.units import JSON, MM
 
@@ -165,7 +165,7 @@ def judge_labels(
             "signature": Statement("residual", {"parts": judged.residual}),
         }
     if judged.status != judged.by_identification:
-        verdict = contradicted(verdict)
+        verdict = lowered_by_held_out(verdict)
     lead = judged.outcome.lead if judged.outcome else None
     change = lead.hypothesis.likeliest if lead and judged.claimed else None
     return rows, verdict, _story(task, judged, verdict, gates), change

@@ -17,7 +17,7 @@ from metro.loop.search.trial import Gates, Trial
 from metro.loop.statement import Statement
 from metro.loop.verdict.advice import more_runs, next_experiment
 from metro.loop.verdict.residual import Residual, enough_runs, residual_of
-from metro.loop.verdict.verification import contradicted, held_out_error, verification
+from metro.loop.verdict.verification import held_out_error, lowered_by_held_out, verification
 from metro.observables.problem import Problem
 from metro.observables.quantity import quantity
 from metro.units import JSON, Array
@@ -84,7 +84,7 @@ def judge(problem: Problem, outcome: Outcome, rows: pd.DataFrame, gates: Gates) 
         "unexplained": _unexplained(problem, outcome, rows, residual) if residual.parts else None,
         **({"traces": below} if below else {}),
     }
-    return contradicted(verdict) if residual.held_out else verdict
+    return lowered_by_held_out(verdict) if residual.held_out else verdict
 
 
 def traces(outcome: Outcome, materiality: float) -> Statement | None:

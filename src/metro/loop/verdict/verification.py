@@ -69,7 +69,7 @@ def verification(problem: Problem, outcome: Outcome, rows: pd.DataFrame, error: 
     }
 
 
-def contradicted(verdict: JSON) -> JSON:
+def lowered_by_held_out(verdict: JSON) -> JSON:
     """Believe the effects of a verdict no more than they explain of the held-out runs, which contradict it.
 
     As a residual of the identification runs does, theirs may be of an unknown cause of the same signature.
