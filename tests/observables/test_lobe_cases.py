@@ -11,7 +11,7 @@ from metro.dynamics.lobes import stability_boundary
 from metro.dynamics.system import Cut, Structure
 from metro.observables.stability.boundary import Cutting
 from metro.observables.stability.cases import NOWHERE, boundaries, cases_of
-from metro.observables.stability.errors import COMMON_SD
+from metro.observables.stability.errors import COMMON_SD, frequency_sd
 from metro.observables.stability.positions import Tip
 from metro.observables.stability.problem import LabelProblem
 
@@ -59,6 +59,13 @@ def test_a_change_reaches_every_case():
         [lambda model: model, lambda model: replace(model, structure=softer)]
     )
     np.testing.assert_allclose(after - before, np.log(0.5), rtol=1e-3)
+
+
+def test_a_case_doubts_frequencies_by_more_than_their_scatter_and_nothing_else():
+    mass = STRUCTURE.stiffness / STRUCTURE.omega**2
+    np.testing.assert_array_equal(CASES[0].sd[:2], frequency_sd(TIP.sd[:2], mass))
+    assert np.all(CASES[0].sd[:2] > TIP.sd[:2])
+    np.testing.assert_array_equal(CASES[0].sd[2:], [*TIP.sd[2:], *CUTTING.sd])
 
 
 def test_deviations_are_those_of_what_is_uncertain():

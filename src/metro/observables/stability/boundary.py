@@ -16,7 +16,6 @@ from metro.dynamics.teeth import equal_teeth, mean_directional_factors
 from metro.observables.cut import conditions as cutting_force
 from metro.observables.problem import Refusal
 from metro.observables.stability.chatter import LABELS
-from metro.observables.stability.errors import deviations
 from metro.observables.stability.positions import Tip
 from metro.units import DEG, JSON, MM, N_MM2, Array
 
@@ -210,16 +209,17 @@ def solve(tip: Tip, cutting: Cutting, first: pd.Series, rpm: Array, *, check: bo
     ``check``: also solve some of the samples exactly.
     """
     turns, cuts = cuts_of(first, cutting)
-    errors = deviations(np.concatenate([tip.sd, cutting.sd]), SAMPLES, 1)
+    sd = np.concatenate([tip.sd, cutting.sd])
+    deviations = np.random.default_rng(1).normal(size=(SAMPLES, len(sd))) * np.where(np.isfinite(sd), sd, 0.0)
     found = [boundary_of_edge(tip.structure, cut, rpm) for cut in cuts]
     boundaries = [one.boundary() for one in found]
-    samples = [one.samples(tip.structure, errors) for one in found]
+    samples = [one.samples(tip.structure, deviations) for one in found]
     which = np.argmin([one.depth for one in boundaries], axis=0)
     lobes = Lobes(tip, cuts, turns, _lowest(boundaries, which), which, np.min(samples, axis=0))
     if not check:
         return lobes
     some = slice(ANEW_EVERY // 2, None, ANEW_EVERY)
-    solved = [depths_anew(tip.structure, cut, rpm[some], errors[:ANEW]) for cut in cuts]
+    solved = [depths_anew(tip.structure, cut, rpm[some], deviations[:ANEW]) for cut in cuts]
     exact, near = np.min(solved, axis=0), lobes.samples[:ANEW, some]
     limited = np.isfinite(exact) & np.isfinite(near) & (exact > 0.0) & (near > 0.0)
     return replace(lobes, anew=np.divide(near, exact, out=np.full(near.shape, np.nan), where=limited))

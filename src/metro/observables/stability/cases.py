@@ -16,7 +16,7 @@ from metro.dynamics.by_depth import boundary_of_edge
 from metro.dynamics.stability_model import StabilityModel
 from metro.observables.stability import boundary as stability
 from metro.observables.stability.boundary import Cutting
-from metro.observables.stability.errors import deviations
+from metro.observables.stability.errors import deviations, frequency_sd
 from metro.observables.stability.positions import Tip
 from metro.units import Array
 
@@ -58,6 +58,13 @@ class Case:
         return np.log(np.where(known, sampled, 1.0) / np.where(known, lowest, 1.0))
 
 
+def _doubted(tip: Tip) -> Array:
+    """Return deviations (3 m,) of a tip's modes; of frequencies also by what no scatter shows."""
+    omega, *others = np.split(tip.sd, 3)
+    mass = tip.structure.stiffness / tip.structure.omega**2
+    return np.concatenate([frequency_sd(omega, mass), *others])
+
+
 def boundaries(cases: Sequence[Case], changes: Sequence[Change]) -> tuple[Array, Array]:
     """Log depths and chatter frequencies (t, p), Hz, at all points, after each of t changes."""
     return _at_all_points(stability_model.boundaries, cases, changes)
@@ -92,7 +99,7 @@ def cases_of(
             tip, rpm = known[str(name)], np.unique(same["spindle_rpm"].to_numpy(float))
             cuts = stability.cuts_of(same.iloc[0], cutting)[1]
             model = StabilityModel(tip.structure, cuts, cutting.tool.radius)
-            made.append(Case(tip.position, model, rpm, np.concatenate([tip.sd, cutting.sd])))
+            made.append(Case(tip.position, model, rpm, np.concatenate([_doubted(tip), cutting.sd])))
             point[same.index] = first + np.searchsorted(rpm, same["spindle_rpm"].to_numpy(float))
             first += len(rpm)
     return tuple(made), point.to_numpy()

@@ -3,6 +3,9 @@
 The scatter of blows is the least of them. The sensor of a hammer test has a mass, the machine is warmer in
 the cut than it was at the test, and the spindle does not turn quite as fast as it says. All three move lobes
 along the speed: hardly anything on a flat part of the boundary, a lot on a steep flank.
+
+Verdicts on labels allow for them. The band of the diagram holds the scatter alone: its samples are to first
+order, which on steep flanks goes far below the lowest depth that any frequency leads to.
 """
 
 from __future__ import annotations

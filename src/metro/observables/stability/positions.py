@@ -11,7 +11,6 @@ import pandas as pd
 from metro.batch.batch import Batch
 from metro.batch.capabilities import plural
 from metro.dynamics.system import Structure
-from metro.observables.stability.errors import frequency_sd
 from metro.robot.stations import Stations, leave_one_out, stiffness_at
 from metro.units import MM, Array
 
@@ -25,8 +24,7 @@ class Tip:
     position : its name; the part before "/" is the pose.
     structure : modes in x and in y (or z in its place).
     names : (m,) direction and number of each mode, "x1": the same mode has the same name at every position.
-    sd : (3 m,) standard deviations of the logarithms of omega, zeta, stiffness; of omega also by what no
-        scatter shows (:func:`metro.observables.stability.errors.frequency_sd`).
+    sd : (3 m,) standard deviations of the logarithms of omega, zeta, stiffness.
     interpolated : whether the modes are those of other positions, interpolated.
     """
 
@@ -79,7 +77,6 @@ def _tip(position: str, rows: pd.DataFrame, letters: np.ndarray) -> Tip:
         ("stiffness_sd", "stiffness_n_m"),
     )
     relative = [rows[sd].to_numpy(float) / rows[value].to_numpy(float) for sd, value in pairs]
-    relative[0] = frequency_sd(relative[0], structure.stiffness / structure.omega**2)
     counted = [f"{d}{1 + int(np.sum(letters[:i] == d))}" for i, d in enumerate(letters)]
     names = tuple(rows["mode"].astype(str)) if followed else tuple(counted)
     return Tip(position, structure, names, np.concatenate(relative))
