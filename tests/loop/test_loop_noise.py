@@ -13,6 +13,7 @@ from metro.loop.fitting.expectation import updated
 from metro.loop.fitting.noise import (
     Noise,
     block_sigma,
+    columns,
     diagonal,
     first_noise,
     missed,
@@ -54,7 +55,7 @@ def estimated(parts, prior, steps=120):
     noise = prior
     for _ in range(steps):
         noise = updated(
-            noise, prior, [(one, rest, shared(one, noise, matrix, BETA)) for one, matrix, rest in parts]
+            noise, prior, [(one, rest, columns(one, noise, matrix, BETA)) for one, matrix, rest in parts]
         )
     return noise
 
@@ -146,7 +147,7 @@ def test_a_load_test_tells_nothing_of_the_scatter_of_cuts():
     load = replace(one, role="calibrate")
     prior = first_noise(0.0, np.full(2, 0.01), [load])
     assert shared(load, prior, matrix, BETA) == pytest.approx(np.full((POINTS, 1), 0.02))
-    after = updated(prior, prior, [(load, rest, shared(load, prior, matrix, BETA))])
+    after = updated(prior, prior, [(load, rest, columns(load, prior, matrix, BETA))])
     assert after.scatter == pytest.approx(prior.scatter)
     assert after.misfit == {}
 

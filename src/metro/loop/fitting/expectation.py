@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,10 +17,10 @@ from metro.loop.fitting.noise import (
     MISFIT_CORRELATION,
     PRIOR_RUNS,
     Noise,
+    alike_times,
     apart,
     axes,
-    missed,
-    sound,
+    sizes,
 )
 from metro.observables.problem import Block
 from metro.units import Array
@@ -40,8 +42,8 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
 
     Parameters
     ----------
-    parts : for each run: block, residual (n,), and directions (n, k) under ``noise``. The first p directions
-        of a run are those of the base parameters that scatter, then come its zeros.
+    parts : for each run: block, residual (n,), and the ``columns`` (n, k) of what it shares. The first p of
+        a run are those of the base parameters that scatter, then come its zeros.
     """
     at = prior.scattering
     p = len(at)
@@ -50,17 +52,16 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
     moments: dict[str, Array] = {}
     residuals: list[tuple[Block, Array, Array]] = []
     largest = min((_may_be_off(block) for block, _, _ in parts if block.belief), default=np.inf)
-    for block, residual, directions in parts:
+    for block, residual, columns in parts:
         if block.role == "calibrate":
             continue
-        known, wrong = sound(block, noise), apart(block, noise) * missed(block, noise)
-        variance = known + MISFIT_CORRELATION * wrong
         names, number, rms = axes(block)
-        # The misfit as it is, not as it weighs: else it takes what the shared directions explain.
-        # The budget counts for all runs that share it, so that it does not average out; but the residual of
-        # each is no larger by that.
-        own = sound(block, noise, once=True)
-        expected, left, found = _expected(residual, directions, (own, known + wrong, variance), rms, number)
+        misfit, level = (
+            np.array([part.get(name, 0.0) for name in names]) for part in (noise.misfit, noise.level)
+        )
+        directions = columns * sizes(block, noise)
+        weights = _Weights(misfit, level, noise.budget, apart(block, noise), alike_times(block, noise))
+        expected, left, variance, found = _says(residual, directions, _known(block), (rms, number), weights)
         amplitudes["scatter"] += [float(size**2 * expected[:p].mean())] if p else []
         of_zeros = expected[p : p + block.zeros.shape[1]]
         amplitudes["zero"] += [float(noise.zero_factor**2 * of_zeros.mean())] if len(of_zeros) else []
@@ -68,26 +69,75 @@ def updated(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Arra
         for name, moment in zip(names, found, strict=True):
             moments[name] = moments.get(name, 0.0) + moment
     factor = {key: float(np.sqrt(np.mean(values))) for key, values in amplitudes.items()}
-    misfit: dict[str, float] = {}
-    level: dict[str, float] = {}
+    misfit_of: dict[str, float] = {}
+    level_of: dict[str, float] = {}
     for name, moment in moments.items():
         share, flat = _squares(moment)
-        misfit[name] = _towards(share, noise.misfit.get(name, 0.0))
-        level[name] = _towards(flat, noise.level.get(name, 0.0))
+        misfit_of[name] = _towards(share, noise.misfit.get(name, 0.0))
+        level_of[name] = _towards(flat, noise.level.get(name, 0.0))
     return replace(
         noise,
         scatter=np.minimum(prior.scatter * factor["scatter"], largest),
         zero_factor=min(factor["zero"], LARGEST_ZERO),
-        misfit=misfit,
-        level=level,
+        misfit=misfit_of,
+        level=level_of,
         alike=_alike(residuals),
     )
+
+
+class _Weights(NamedTuple):
+    """What a noise makes of a block's errors.
+
+    ``misfit``, ``level``: (axes,). ``budget``: relative. ``apart``: how many times what the model gets wrong
+    counts. ``alike``: how many times the variance counts that repeats may share.
+    """
+
+    misfit: Array
+    level: Array
+    budget: float
+    apart: float
+    alike: float
+
+
+@lru_cache(maxsize=1024)
+def _known(block: Block) -> tuple[Array, Array, Array]:
+    """Return standard error, that which repeats may share, and size of the signal of a block, each (n,)."""
+    scale = axes(block)[2] if block.scale is None else block.scale
+    alike = np.zeros_like(block.sigma) if block.alike is None else block.alike
+    return block.sigma.astype(float), alike.astype(float), np.asarray(scale, dtype=float)
 
 
 def _may_be_off(block: Block) -> float:
     """Least relative error of what a block believes to be of a size; infinite of what has none."""
     sized = block.measured != 0.0
     return float(np.min(block.sigma[sized] / np.abs(block.measured[sized]), initial=np.inf))
+
+
+@compiled_with_arrays
+def _says(
+    residual: Array,
+    directions: Array,
+    known: tuple[Array, Array, Array],
+    axis: tuple[Array, npt.NDArray[np.intp]],
+    weights: _Weights,
+) -> tuple[Array, Array, Array, Array]:
+    """Return what a run says of its noise, as :func:`_expected`, and its variance: the misfit as it weighs.
+
+    The misfit is taken as it is where the shared directions are taken off, not as it weighs: else it takes
+    what those explain. The budget counts for all runs that share it, so that it does not average out; but the
+    residual of each is no larger by that.
+    """
+    count, (sigma, alike, scale), (rms, number) = len(residual), known, axis
+    own, once, variance = np.empty(count), np.empty(count), np.empty(count)
+    for i in range(count):
+        single = sigma[i] ** 2 + alike[i] ** 2 * weights.alike
+        budget = (weights.budget * scale[i]) ** 2
+        missed = (weights.misfit[number[i]] * rms[i]) ** 2 + weights.level[number[i]] ** 2
+        own[i] = single + budget
+        once[i] = single + weights.apart * (budget + missed)
+        variance[i] = single + weights.apart * (budget + MISFIT_CORRELATION * missed)
+    expected, left, moments = _expected(residual, directions, (own, once, variance), rms, number)
+    return expected, left, variance, moments
 
 
 @compiled_with_arrays
@@ -117,16 +167,12 @@ def _expected(
     deviation, covariance = amplitude(directions, residual, variance)
     expected = deviation**2 + np.diag(covariance)
     deviation, covariance = amplitude(directions, residual, once)
-    count = directions.shape[1]
-    left, moments = np.empty_like(residual), np.zeros((number.max() + 1, 2, 3))
+    left, moments = residual - directions @ deviation, np.zeros((number.max() + 1, 2, 3))
+    across = directions @ covariance
     for i in range(len(residual)):
-        taken, spread = 0.0, 0.0
-        for j in range(count):
-            taken += directions[i, j] * deviation[j]
-            spread += covariance[j, j] * directions[i, j] ** 2
-            for k in range(j):
-                spread += 2.0 * directions[i, j] * covariance[j, k] * directions[i, k]
-        left[i] = residual[i] - taken
+        spread = 0.0
+        for j in range(directions.shape[1]):
+            spread += across[i, j] * directions[i, j]
         excess = (left[i] ** 2 + spread - own[i]) / variance[i]
         first, second = rms[i] ** 2 / variance[i], 1.0 / variance[i]
         at = moments[number[i]]
@@ -142,17 +188,11 @@ def _expected(
 @compiled_with_arrays
 def amplitude(directions: Array, residual: Array, variance: Array) -> tuple[Array, Array]:
     """Return the expected amplitude of each shared direction (k,), and the covariance of that."""
-    count = directions.shape[1]
-    precision, right = np.eye(count), np.zeros(count)
+    weighted = np.empty_like(directions)
     for i in range(len(residual)):
-        for j in range(count):
-            weighted = directions[i, j] / variance[i]
-            right[j] += weighted * residual[i]
-            for k in range(j + 1):
-                precision[j, k] += weighted * directions[i, k]
-    for j in range(count):
-        for k in range(j):
-            precision[k, j] = precision[j, k]
+        for j in range(directions.shape[1]):
+            weighted[i, j] = directions[i, j] / variance[i]
+    precision, right = np.eye(directions.shape[1]) + directions.T @ weighted, residual @ weighted
     covariance = np.asarray(np.linalg.inv(precision), dtype=np.float64)
     return np.asarray(covariance @ right), covariance
 

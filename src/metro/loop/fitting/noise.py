@@ -114,17 +114,20 @@ def diagonal(block: Block, noise: Noise, correlation: float = MISFIT_CORRELATION
     return np.asarray(variance)
 
 
-def sound(block: Block, noise: Noise, *, once: bool = False) -> Array:
+def sound(block: Block, noise: Noise) -> Array:
     """Variance of each element that nothing else shares where the model misses nothing, (n,).
 
-    ``once``: with the budget of a run by itself; else it counts for all runs that share what a model gets
-    wrong.
+    The budget counts for all runs that share what a model gets wrong.
     """
     scale = axes(block)[2] if block.scale is None else block.scale
+    alike = 0.0 if block.alike is None else block.alike**2 * alike_times(block, noise)
+    return np.asarray(block.sigma**2 + alike + apart(block, noise) * (noise.budget * scale) ** 2)
+
+
+def alike_times(block: Block, noise: Noise) -> float:
+    """Return how many times the error that repeats may share counts in one of them."""
     repeats = noise.repeats.get(block.condition, 1) * block.repeats
-    alike = 0.0 if block.alike is None else block.alike**2 * (1.0 + noise.alike * (repeats - 1.0))
-    times = 1.0 if once else apart(block, noise)
-    return np.asarray(block.sigma**2 + alike + times * (noise.budget * scale) ** 2)
+    return 1.0 + noise.alike * (repeats - 1.0)
 
 
 def apart(block: Block, noise: Noise) -> float:
@@ -184,12 +187,26 @@ def log_determinant(block: Block, noise: Noise, directions: Array, whiten: White
 
 def shared(block: Block, noise: Noise, design: Array, beta: Array) -> Array:
     """Directions of the errors that the whole block shares, (n, k), each of one standard deviation."""
-    zeros = block.zeros * (block.zero_sd * noise.zero_factor)
-    unidentified = zeros[:, :0] if block.unidentified is None else block.unidentified
-    if block.role == "calibrate":
-        return np.hstack([zeros, unidentified])
-    at = noise.scattering
-    return np.hstack([design[:, at] * (beta[at] * noise.scatter[at]), zeros, unidentified])
+    return columns(block, noise, design, beta) * sizes(block, noise)
+
+
+def columns(block: Block, noise: Noise, design: Array, beta: Array) -> Array:
+    """Directions (n, k) of what a whole block shares, for a scatter of one and for zeros as declared."""
+    parts = [block.zeros * block.zero_sd]
+    if block.unidentified is not None:
+        parts.append(block.unidentified)
+    if block.role != "calibrate":
+        at = noise.scattering
+        parts.insert(0, design[:, at] * beta[at])
+    return np.concatenate(parts, axis=1)
+
+
+def sizes(block: Block, noise: Noise) -> Array:
+    """Return the size (k,) of each of the ``columns`` of a block under a noise."""
+    own = 0 if block.unidentified is None else block.unidentified.shape[1]
+    of_zeros = np.full(block.zeros.shape[1], noise.zero_factor)
+    scatter = noise.scatter[noise.scattering] if block.role != "calibrate" else of_zeros[:0]
+    return np.concatenate([scatter, of_zeros, np.ones(own)])
 
 
 def whitener(variance: Array, directions: Array) -> Whitener:

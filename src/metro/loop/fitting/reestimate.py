@@ -8,8 +8,9 @@ from metro.loop.fitting import noise as noise_room
 from metro.loop.fitting.candidate import Candidate
 from metro.loop.fitting.expectation import updated
 from metro.loop.fitting.noise import Noise
-from metro.loop.fitting.system import State, linearised
+from metro.loop.fitting.system import State, designs, linearised
 from metro.observables.problem import Block
+from metro.units import Array
 
 EM_STEPS = 8  # of expectation and maximisation, at most
 
@@ -22,27 +23,24 @@ def reestimated(
     A misfit hides from what whole runs share what that would explain, and may then never come down.
     """
     starts = [noise, noise.sound] if noise_room.misses(noise) else [noise]
-    reached = [_expected(candidate, blocks, prior, start, state) for start in starts]
+    parts = [
+        (
+            block,
+            block.measured - offset - matrix @ state.beta,
+            noise_room.columns(block, noise, matrix, state.beta),
+        )
+        for block, (matrix, offset) in zip(blocks, designs(candidate, blocks, state), strict=True)
+    ]
+    reached = [_expected(start, prior, parts) for start in starts]
     if len(reached) == 1:
         return reached[0]
     return min(reached, key=lambda one: linearised(candidate, blocks, one, state, derivatives="none").cost)
 
 
-def _expected(
-    candidate: Candidate, blocks: Sequence[Block], prior: Noise, noise: Noise, state: State
-) -> Noise:
+def _expected(noise: Noise, prior: Noise, parts: Sequence[tuple[Block, Array, Array]]) -> Noise:
     """Take some steps of expectation–maximisation for the noise."""
-    model = candidate.model(state.theta)
-    parts = []
-    for block in blocks:
-        matrix, offset = model.design(block, state.nuisance[block.run], state.beta)
-        parts.append((block, block.measured - offset - matrix @ state.beta, matrix))
     for _ in range(EM_STEPS):
-        directions = [
-            (block, residual, noise_room.shared(block, noise, matrix, state.beta))
-            for block, residual, matrix in parts
-        ]
-        before, noise = noise, updated(noise, prior, directions)
+        before, noise = noise, updated(noise, prior, parts)
         if noise_room.alike(before, noise):
             break
     return noise

@@ -159,6 +159,12 @@ def _design(point: _Point, block: Block, nuisance: tuple[float, ...]) -> tuple[A
     return _kept(*point.model.design(block, np.array(nuisance), point.beta))
 
 
+def designs(candidate: Candidate, blocks: Sequence[Block], state: State) -> list[tuple[Array, Array]]:
+    """Return design (n, p) and offset (n,) of each block at a state."""
+    point = _point(candidate, tuple(state.theta.tolist()), tuple(state.beta.tolist()))
+    return [_design(point, block, tuple(state.nuisance[block.run].tolist())) for block in blocks]
+
+
 @lru_cache(maxsize=512)
 def _slopes(point: _Point, block: Block, nuisance: tuple[float, ...], first: int) -> tuple[Array, Array]:
     """Return derivatives by effect parameters from ``first`` on, and by the block's own unknowns."""

@@ -15,7 +15,7 @@ from metro.loop.fitting.fit import Fit, Race, cost_under, fit
 from metro.loop.fitting.noise import Noise
 from metro.loop.fitting.nuisances import search_nuisance
 from metro.loop.fitting.race import raced
-from metro.loop.fitting.system import State, ahead, linearised, normal_equations
+from metro.loop.fitting.system import State, ahead, effect_slopes, linearised, normal_equations
 from metro.loop.search.settled import beyond, beyond_left_out, unsettled
 from metro.loop.statement import Statement
 
@@ -126,7 +126,9 @@ def _promised(current: Fit, effect: Effect) -> float:
     theta = np.concatenate([current.theta, [one.starts[0] for one in effect.parameters]])
     state = State(theta, current.beta, {})
     search_nuisance(candidate, current.blocks, current.noise, state, current.nuisance)
-    system = linearised(candidate, current.blocks, current.noise, state)
+    own = State(current.theta, current.beta, dict(current.nuisance))
+    slopes = effect_slopes(current.candidate, current.blocks, own)
+    system = linearised(candidate, current.blocks, current.noise, state, slopes=slopes)
     return system.cost - ahead(*normal_equations(system))
 
 
