@@ -70,7 +70,8 @@ class Surroundings:
     tilt : of the spindle about work x, y, rad. growth : of the tool, m/s. bow : (xx, xy, yy), m.
     vibration : Hz, m; ``phase`` of it where the face begins, rad. entry : how much too high the tip is where
         the axis comes over the plate's edge, m, and over which length that goes, m.
-    settling : m, by which the tool grows while it warms up, and the time (s) that this takes.
+    settling : m, by which the tool grows once it is no longer cooled, the time (s) that this takes, and from
+        when on, s.
     levels : (passes,) how high each pass is set, m; None: all at zero.
     spot : x, y, radius and height of a bump, m. sag : m, of the cross-rail: goes with v³.
     """
@@ -81,7 +82,7 @@ class Surroundings:
     vibration: tuple[float, float] = (0.0, 0.0)
     phase: float = 0.0
     entry: tuple[float, float] = (0.0, 1.0)
-    settling: tuple[float, float] = (0.0, 1.0)
+    settling: tuple[float, float, float] = (0.0, 1.0, 0.0)
     levels: Array | None = None
     spot: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 0.0)
     sag: float = 0.0
@@ -89,7 +90,8 @@ class Surroundings:
     def of_tip(self, number: int, s: Array, t: Array) -> Array:
         """How much higher (n,), m, the tip is in a pass, with the axis at ``s`` (m) at times ``t`` (s)."""
         high = self.vibration[1] * np.sin(2.0 * math.pi * self.vibration[0] * t + self.phase)
-        high -= self.growth * t + self.settling[0] * -np.expm1(-t / self.settling[1])
+        length, constant, begins = self.settling
+        high -= self.growth * t + length * -np.expm1(-np.maximum(t - begins, 0.0) / constant)
         high += np.where(s >= 0.0, self.entry[0] * np.exp(-np.maximum(s, 0.0) / self.entry[1]), 0.0)
         return np.asarray(high + (0.0 if self.levels is None else float(self.levels[number])))
 

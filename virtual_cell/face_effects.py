@@ -50,12 +50,13 @@ def _spot(rng: np.random.Generator, cell: FaceCell) -> Parameters:
     }
 
 
-def _settling(rng: np.random.Generator, cell: FaceCell) -> Parameters:
-    """Draw a growth that is over within a few passes."""
-    period = cell.passes("L").period
+def _uncooled(rng: np.random.Generator, cell: FaceCell) -> Parameters:
+    """Draw a coolant that fails within a face: the tool grows from there on, within a few passes."""
+    passes = cell.passes("L")
     return {
         "growth_um": drawn_size(rng, 10.0, 250.0),
-        "time_constant_s": float(f"{period * rng.uniform(0.7, 2.0):.3g}"),
+        "time_constant_s": float(f"{passes.period * rng.uniform(0.7, 2.0):.3g}"),
+        "from_s": float(f"{passes.period * len(passes.axes) * rng.uniform(0.3, 0.6):.3g}"),
     }
 
 
@@ -104,10 +105,10 @@ OUTSIDE: Mapping[str, Hidden[FaceCell]] = {
             c, spot=(p["x_mm"] * MM, p["y_mm"] * MM, p["radius_mm"] * MM, p["height_um"] * UM)
         ),
     ),
-    "settling_growth": Hidden(
-        "growth_um time_constant_s",
-        _settling,
-        lambda c, p: _round(c, settling=(p["growth_um"] * UM, p["time_constant_s"])),
+    "failed_coolant": Hidden(
+        "growth_um time_constant_s from_s",
+        _uncooled,
+        lambda c, p: _round(c, settling=(p["growth_um"] * UM, p["time_constant_s"], p["from_s"])),
     ),
     "scanner_distortion": Hidden(
         "uuu_um uuv_um uvv_um vvv_um",

@@ -298,6 +298,11 @@ COMPOSED = {
     "stiffness_hardening": ({"cubic": 2e12}, {"cubic": 5e12}, added),
     "stiffness_scale": ({"factor": 0.8}, {"factor": 1.3}, multiplied),
     "thermal_growth": ({"um_per_min": 5.0}, {"um_per_min": -12.0}, added),
+    "thermal_growth levelling off": (
+        {"um_per_min": 5.0, "settles_s": 40.0},
+        {"um_per_min": -12.0, "settles_s": 40.0},
+        lambda a, b: a | {"um_per_min": a["um_per_min"] + b["um_per_min"]},
+    ),
     "tip_drift": (
         {"x_um_per_run": 1.0, "y_um_per_run": 2.0},
         {"x_um_per_run": 3.0, "y_um_per_run": -5.0},

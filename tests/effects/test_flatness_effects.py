@@ -1,5 +1,6 @@
 """Effects of flatness in faces made by formulas: found where they are, unseen where zeros hide them."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -23,6 +24,7 @@ from metro.loop.search.search import search
 from metro.loop.verdict.verdict import parameters
 from metro.observables.flatness.model import _shaped
 from metro.observables.flatness.setup import Setup, bow_shapes
+from metro.observables.flatness.setup import grown as share_of_minute
 from metro.observables.problem import predictions
 
 
@@ -32,6 +34,10 @@ def tilted(dx, dy, **_cut):
 
 def grown(time, **_cut):
     return -25e-3 / 60.0 * time
+
+
+def warmed_up(time, **_cut):
+    return 60e-3 * np.expm1(-time / 8.0)
 
 
 def entered(way, **_cut):
@@ -125,6 +131,35 @@ def test_a_second_vibration_is_found_beside_the_declared_one_each_with_its_own_p
         low, high = parameters(found, "path_vibration")[parameter]["ci95"]
         assert low < value < high
         assert high - low < 0.2 * value
+
+
+def test_a_spindle_that_warms_up_levels_off_and_one_that_grows_evenly_does_not():
+    """Else what the first passes have more than the last looks like a transient of every pass."""
+    totals, fits = [], []
+    for made in (warmed_up, grown):
+        task = problem(hidden=made)
+        base, prior = base_fit(task)
+        forms = [e for e in fitted_to(library("flatness"), task)[0] if e.name == "thermal_growth"]
+        assert [form.form for form in forms] == ["", "levelling off"]
+        fits.append([fit(Candidate(task.base, (each,)), base.blocks, prior, base) for each in forms])
+        totals.append([each.total for each in fits[-1]])
+    assert totals[0][1] > totals[0][0] + 8.0
+    found = parameters(fits[0][1], "thermal_growth")
+    for name, value in {"um_per_min": 60.0, "settles_s": 8.0}.items():
+        low, high = found[name]["ci95"]
+        assert low < value < high
+        assert high - low < 0.5 * value
+    assert totals[1][1] < totals[1][0] + 3.0
+
+
+@pytest.mark.parametrize("settles", [5.0, 90.0, 1e7])
+def test_a_growth_is_counted_by_its_first_minute(settles):
+    time = np.array([0.0, 1e-3, 60.0, 1e12])
+    minute, (none, first, one, whole) = 1.0 - math.exp(-60.0 / settles), share_of_minute(time, settles)
+    assert (none, one) == (0.0, pytest.approx(1.0))
+    assert first == pytest.approx(1e-3 / settles / minute, rel=1e-3)  # the slope at which it begins
+    assert whole == pytest.approx(1.0 / minute, rel=1e-6)
+    assert share_of_minute(time, math.inf)[:3] == pytest.approx(share_of_minute(time, 1e7)[:3], abs=1e-5)
 
 
 def test_a_droop_that_goes_with_the_force_is_one_and_not_the_same_in_all_faces():
@@ -221,10 +256,6 @@ def test_a_slope_that_the_place_of_an_unplaced_scan_takes_is_not_found(name):
     assert found.total < base.total + 6.0
 
 
-def settled(time, **_cut):
-    return -60e-3 * (1.0 - np.exp(-time / 8.0))
-
-
 def distorted(x, y):
     u, v = x / 60.0 - 1.0, y / 30.0 - 1.0
     return 25e-3 * u**3 - 15e-3 * u * v**2
@@ -233,12 +264,12 @@ def distorted(x, y):
 @pytest.mark.parametrize(
     ("made", "name", "likelier"),
     [
-        ({"hidden": settled}, "pass_levels", 10.0),
+        ({"hidden": lambda number, **_cut: 20e-3 * np.sin(1.3 * number)}, "pass_levels", 10.0),
         # One deeper pass is no polynomial over the passes: it is only more like that than like all else.
         ({"hidden": lambda number, **_cut: -20e-3 * (number == 2)}, "pass_levels", 0.0),
         ({"work": distorted}, "cubic_form", 10.0),
     ],
-    ids=["settling", "one pass deeper", "distortion"],
+    ids=["uneven passes", "one pass deeper", "distortion"],
 )
 def test_what_is_outside_the_library_is_most_like_a_cause_of_its_kind(made, name, likelier):
     task = problem(**made)

@@ -1,6 +1,7 @@
 """Flatness of a batch: a synthetic face whose compliance is known, and the simulated one, end to end."""
 
 import errno
+import math
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -270,7 +271,7 @@ def test_an_effect_changes_a_face_of_unknown_place_by_no_offset_and_no_tilt(plac
     batch = make_batch() if place_known else make_batch(MANIFEST | {"instruments": {"scanner": scanner}})
     _, task = observed_problem(batch, reader(batch))
     block = task.role("identify")[0]
-    grown = replace(task.base, setup=replace(task.base.setup, growth=1e-7))
+    grown = replace(task.base, setup=replace(task.base.setup, growth=((6e-6, math.inf),)))
     start = task.base.nuisance_starts(block)[0]
     change = grown.design(block, start)[1] - task.base.design(block, start)[1]
     plane = np.abs(block.zeros.T @ change).max()

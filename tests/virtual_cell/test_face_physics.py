@@ -107,12 +107,13 @@ def test_growth_is_a_staircase_in_the_number_of_the_pass_on_a_ramp_along_it():
         np.testing.assert_allclose(z, -rate * behind, atol=1e-12)
 
 
-def test_growth_that_settles_begins_as_a_line_and_ends_at_its_amount():
+def test_growth_without_coolant_begins_when_that_fails_and_ends_at_its_amount():
     x = np.array([0.03])
     amount, tau = 30e-6, 5.0
-    z = surface(PASSES, flat(PASSES), Surroundings(settling=(amount, tau)), on_axis(PASSES, 1, x))
     t = PERIOD + (0.03 + RADIUS + LEAD) / SPEED
-    assert z[0] == pytest.approx(-amount * (1.0 - np.exp(-t / tau)), rel=1e-9)
+    for begins in (0.0, 0.4 * t, 2.0 * t):
+        z = surface(PASSES, flat(PASSES), Surroundings(settling=(amount, tau, begins)), on_axis(PASSES, 1, x))
+        assert z[0] == pytest.approx(-amount * (1.0 - np.exp(-max(t - begins, 0.0) / tau)), rel=1e-9)
 
 
 def test_a_vibration_is_the_lower_of_the_two_passages_of_the_rim():

@@ -103,7 +103,7 @@ def test_a_spindle_is_made_to_grow_at_a_mean_rate_and_less_where_it_is_warm():
         for i in range(8)
     ]
     warm, error = warmth.at_rate(warmth.Warmth((2e-6, 6e-6), (120.0, 1200.0)), 3e-7, session)
-    slopes = [warm.slope(one) for one in session]
+    slopes = [warm.at_first(one) for one in session]
     assert np.mean(slopes) == pytest.approx(3e-7, rel=1e-9)
     assert slopes[0] > slopes[-1]
     assert error == pytest.approx(np.std(slopes) / 3e-7)

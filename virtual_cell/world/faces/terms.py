@@ -98,8 +98,10 @@ def _tilt(cell: Workshop, session: Sequence[FaceRun]) -> Term:
 
 
 def _growth(cell: Workshop, session: Sequence[FaceRun]) -> Term:
-    rate = float(np.mean([cell.always.warm.slope(run) for run in session]))
-    does, told = (done_by(cell, one, session) for one in (cell.always.warm, _Alone(lambda at: -rate * at.t)))
+    warm, times = cell.always.warm, np.linspace(0.0, max(run.duration for run in session) + 1.0, 400)
+    rate, curve = float(np.mean([warm.at_first(run) for run in session])), warm.mean(session, times)
+    alike = _Alone(lambda at: -np.interp(at.t, times, curve))
+    does, told = (done_by(cell, one, session) for one in (warm, alike))
     return _term(cell, {"um_per_min": digits(rate / UM * 60.0)}, does, told)
 
 

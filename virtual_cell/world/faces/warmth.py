@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -43,10 +44,13 @@ class Warmth:
         now, then = self.longer(run.started + t, spans), self.longer(np.array([run.started]), spans)
         return np.asarray(now - then)
 
-    def slope(self, run: FaceRun) -> float:
-        """Return the mean rate of growth over a face, m/s: that of the line of least squares."""
-        t = np.linspace(0.0, run.duration, 50)
-        return float(np.polyfit(t, self.since(run, t), 1)[0])
+    def at_first(self, run: FaceRun) -> float:
+        """Return the mean rate of growth over the first minute of a face, m/s."""
+        return float(self.since(run, np.array([MINUTE]))[0]) / MINUTE
+
+    def mean(self, runs: Sequence[FaceRun], t: Array) -> Array:
+        """Return the growth (n,), m, since a face began, the mean over faces."""
+        return np.asarray(np.mean([self.since(run, t) for run in runs], axis=0))
 
     def in_face(self, run: FaceRun, rng: np.random.Generator) -> Influence:
         """Return a face that gets lower while the tool grows."""
@@ -71,11 +75,11 @@ def drawn(rng: np.random.Generator) -> Warmth:
 
 
 def at_rate(warmth: Warmth, rate: float, runs: list[FaceRun]) -> tuple[Warmth, float]:
-    """Return a spindle that grows at ``rate`` m/s on average over the faces, and how far they differ from it.
+    """Return a spindle that grows at a ``rate``, m/s, in the first minute of faces, and how far they differ.
 
-    The latter is the standard deviation of the rates of the faces over their mean.
+    The rate is the mean over the faces; they differ by its standard deviation, relative.
     """
-    slopes = np.array([warmth.slope(run) for run in runs])
+    slopes = np.array([warmth.at_first(run) for run in runs])
     factor = rate / float(slopes.mean())
     lengths = warmth.lengths[0] * factor, warmth.lengths[1] * factor
     return replace(warmth, lengths=lengths), float(slopes.std() / abs(slopes.mean()))

@@ -15,6 +15,7 @@ from metro.observables.flatness.path import Pace, Passages
 from metro.observables.waviness.model import Vibration
 from metro.units import Array
 
+MINUTE = 60.0  # s
 LEFT = 400  # places behind the last chip at which the remainder of a step is computed, and
 NODES = 24  # of the Gauss rule for each: both to better than 1e-3 of the step
 
@@ -26,7 +27,8 @@ class Setup:
     Attributes
     ----------
     tilt : of the spindle about work x and y through the tool's tip, rad.
-    growth : of tool and spindle from the start of the first pass, m/s.
+    growth : of tool and spindle from the start of the first pass: for each part of it the length in the first
+        minute, m, and the time constant with which it levels off, s; infinite: it does not.
     levels : heights of the passes, from the first to the last of a face: coefficients, m, of the Legendre
         polynomials of degree 1, 2, … over that order.
     bow : (xx, xy, yy) of the work, m: height xx u² + xy u v + yy v², with u, v from −1 to 1 over the work.
@@ -39,7 +41,7 @@ class Setup:
     """
 
     tilt: tuple[float, float] = (0.0, 0.0)
-    growth: float = 0.0
+    growth: tuple[tuple[float, float], ...] = ()
     levels: tuple[float, ...] = ()
     bow: tuple[float, float, float] = (0.0, 0.0, 0.0)
     cubic: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
@@ -60,8 +62,8 @@ class Setup:
         higher = np.zeros_like(passages.along)
         if about_x or about_y:
             higher = (y[:, None] - passages.y) * about_x - (x[:, None] - passages.x) * about_y
-        if self.growth:
-            higher = higher - self.growth * pace.time(passages)
+        for length, settles in self.growth:
+            higher = higher - length * grown(pace.time(passages), settles)
         if any(self.levels):
             place = np.linspace(-1.0, 1.0, len(pace.edge)) if len(pace.edge) > 1 else np.zeros(1)
             higher = higher + np.polynomial.legendre.legval(place, [0.0, *self.levels])[passages.number]
@@ -77,6 +79,13 @@ class Setup:
     def bowed(self) -> Array:
         """Coefficients of the work's form, (7,) m, of :func:`bow_shapes`."""
         return np.array([*self.bow, *self.cubic])
+
+
+def grown(time: Array, settles: float) -> Array:
+    """Return the growth at times, s, over that in the first minute; it levels off with a time constant, s."""
+    if math.isinf(settles):
+        return time / MINUTE
+    return np.asarray(np.expm1(-time / settles) / math.expm1(-MINUTE / settles))
 
 
 def bow_shapes(x: Array, y: Array, size: tuple[float, float]) -> Array:
