@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from metro.loop.checks.evidence import relieved
+from metro.loop.checks.evidence import relieved, spared
 
 RUN = np.array([[1.0, 2.0, 0.0], [1.0, 0.0, 3.0]])  # measured by the gain, and by two that are believed
 BELIEF = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
@@ -39,3 +39,12 @@ def test_it_counts_from_what_is_believed_of_them_and_not_from_zero():
     smaller, larger = (fitted([1.0, value, 0.0], known=(0.5, 0.0)) for value in (0.9, 0.5))
     assert relieved(smaller, larger) == pytest.approx(0.4 * 2.0 / 10.0)
     assert relieved(larger, smaller) == 0.0
+
+
+def test_an_effect_is_as_large_as_the_change_of_what_they_stand_in_for():
+    """All of a strain where it takes that over, and no more than itself where it eases a large one."""
+    strained, eased, free = (fitted([1.0, value, 0.0]) for value in (0.6, 0.59, 0.0))
+    assert spared(strained, free) == pytest.approx(relieved(strained, free)) == pytest.approx(0.6 * 0.2)
+    assert spared(strained, eased) == pytest.approx(0.01 * 0.2)
+    assert relieved(strained, eased) > 10.0 * spared(strained, eased)
+    assert spared(eased, strained) == 0.0

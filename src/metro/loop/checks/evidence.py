@@ -42,7 +42,7 @@ class Evidence:
         not worth computing.
     moved : rms change of the prediction over the rms of the signal.
     size : the same, with what the base parameters are spared of straying from what is believed of them
-        (:func:`relieved`).
+        (:func:`spared`).
     missed : rms of what the larger candidate misses beyond the noise, over that of the signal.
     sought : number of places among which the additional effects were sought, on all runs.
     """
@@ -79,7 +79,7 @@ def compare(smaller: Fit, larger: Fit) -> Evidence:
     sought = _sought(larger) / _sought(smaller)
     p_value = -math.expm1(sought * math.log1p(-min(tail(statistic, parameters, runs), 1.0 - 1e-16)))
     moved = change(smaller, larger)
-    size = math.hypot(moved, relieved(smaller, larger))
+    size = math.hypot(moved, spared(smaller, larger))
     return Evidence(statistic, p_value, {}, moved, size, missed(larger), sought)
 
 
@@ -108,25 +108,38 @@ def tail(statistic: float, parameters: int, runs: int) -> float:
 
 
 def relieved(smaller: Fit, larger: Fit) -> float:
-    """Rms by which base parameters stray less from what is believed of them, over that measured.
+    """Rms strain that base parameters lose against what is believed of them, over that measured.
 
-    An effect that they stand in for changes no prediction, but spares them a strain: it is as large as that.
+    An effect that they stand in for changes no prediction, but spares them a strain. Squares add up: it is
+    the root of what the mean square of the strain falls by.
     """
+    before, after, signal = _strains(smaller, larger)
+    return math.sqrt(max(float(before @ before) - float(after @ after), 0.0) / signal)
+
+
+def spared(smaller: Fit, larger: Fit) -> float:
+    """Rms of the change of what base parameters stand in for, over that measured; 0 where they strain more.
+
+    An effect that they stand in for is as large as that. One that eases a large strain δ by a little ε
+    relieves √(2 ε δ) of it, which is far more than there is of the effect itself.
+    """
+    before, after, signal = _strains(smaller, larger)
+    change = before - after
+    return math.sqrt(float(change @ change) / signal) if before @ before > after @ after else 0.0
+
+
+def _strains(smaller: Fit, larger: Fit) -> tuple[Array, Array, float]:
+    """Return what the runs show of the strain of base parameters under two fits, and the squares measured."""
     model, beliefs = smaller.candidate.model(smaller.theta), [b for b in smaller.blocks if b.belief]
     if not beliefs:
-        return 0.0
+        return np.zeros(1), np.zeros(1), 1.0
     rows = [model.design(b, smaller.nuisance[b.run], smaller.beta)[0] for b in beliefs]
     of, right = np.vstack(rows), np.concatenate([b.measured for b in beliefs])
     known, believed = np.linalg.lstsq(of, right)[0], of.any(axis=0)
-    strains = [np.where(believed, fitted.beta - known, 0.0) for fitted in (smaller, larger)]
-    taken, signal = 0.0, 0.0
-    for block in smaller.blocks:
-        if block.role != "calibrate":
-            design, _ = model.design(block, smaller.nuisance[block.run], smaller.beta)
-            before, after = (float(np.sum((design @ strain) ** 2)) for strain in strains)
-            taken += before - after
-            signal += float(np.sum(block.measured**2))
-    return math.sqrt(max(taken, 0.0) / signal)
+    runs = [block for block in smaller.blocks if block.role != "calibrate"]
+    designs = np.vstack([model.design(b, smaller.nuisance[b.run], smaller.beta)[0] for b in runs])
+    before, after = (designs @ np.where(believed, one.beta - known, 0.0) for one in (smaller, larger))
+    return before, after, sum(float(np.sum(block.measured**2)) for block in runs)
 
 
 def change(smaller: Fit, larger: Fit) -> float:
