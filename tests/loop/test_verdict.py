@@ -4,6 +4,7 @@ import itertools
 import json
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -286,6 +287,8 @@ def test_there_is_no_trace_where_nothing_is_significant_or_all_is_smaller_than_w
     outcome = search(task, (BEND,), replace(GATES, materiality=0.5))
     assert traces(outcome, 0.5) is None
     assert traces(outcome, 0.01) is not None
+    named = replace(outcome, final=SimpleNamespace(candidate=SimpleNamespace(effects=(BEND,))))
+    assert traces(named, 0.01) is None  # another form of it is named: that none of it is claimed is not so
 
 
 def test_the_unexplained_rest_has_the_size_of_what_the_library_lacks():

@@ -1,4 +1,4 @@
-"""Entry transient: every pass begins too high at the edge of the block and settles over some distance.
+"""Entry transient: every pass begins too high or too low at the edge of the block, and then settles.
 
 Drives that droop under a sudden load, and come back by their integral action, do the opposite where the load
 ends: the tip then is too low behind the last chip. What makes a transient is not always the load (an axis

@@ -91,12 +91,14 @@ def traces(outcome: Outcome, materiality: float) -> Statement | None:
     """Return which effects are significant but smaller than what errors of the model's inputs may cause.
 
     None of them is claimed, since such an error may look like any of them: where nothing was hidden, they
-    are significant, too. That they are there is said all the same. ``materiality``: below it, nothing is.
+    are significant, too. That they are there is said all the same, but of none that is named in another form.
+    ``materiality``: below it, nothing is.
     """
     small = {
         trial.effect.name: trial.why_not.values
         for trial in outcome.trials
-        if trial.why_not and trial.why_not.code == "immaterial" and not trial.effect.resembled
+        if trial.why_not and trial.why_not.code == "immaterial"
+        if not trial.effect.resembled and trial.effect.name not in outcome.names
     }
     seen = [{"effect": name, **sizes} for name, sizes in small.items() if sizes["size"] >= materiality]
     return Statement("traces", {"seen": seen}) if seen else None
