@@ -16,7 +16,7 @@ def fitted(*names):
 def test_a_swap_that_pruning_and_adding_undo_is_made_once(monkeypatch, swap):
     added = []
 
-    def grow(current, _space, _known):
+    def grow(current, *_):
         added.append(current.candidate.effects)
         assert len(added) < 5
         return fitted("resonance", "runout"), [fitted("resonance", "runout")], {}

@@ -10,7 +10,7 @@ made idle is dropped for good. Then each is weighed against its rivals.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import replace
 
 from metro.effects.effect import Effect
@@ -20,7 +20,15 @@ from metro.loop.search.replaceable import is_needed
 from metro.loop.search.rivals import Contest, believed, contested
 from metro.loop.search.significance import least_significant
 from metro.loop.search.strategy import Choice, SearchSpace
-from metro.loop.search.trial import HOPELESS, Trial, parted, small_beside_residual, tried, without
+from metro.loop.search.trial import (
+    HOPELESS,
+    Trial,
+    immaterial,
+    parted,
+    small_beside_residual,
+    tried,
+    without,
+)
 from metro.loop.statement import Statement
 
 SIGNIFICANT = (
@@ -38,26 +46,36 @@ def forward(space: SearchSpace) -> Choice:
 
     Where a rival takes the place of an effect, others may explain what it leaves: they are tried again. No
     set of effects is looked at twice, whether it was weighed or came out of a contest: gates that contradict
-    each other would lead around for ever.
+    each other would lead around for ever. What something that is too small to be claimed explains as well is
+    not claimed either.
     """
     current, steps = space.base, list[Fit]()
     trials: dict[tuple[str, str], Trial] = {}
     contest: Contest | None = None
     weighed: set[frozenset[Effect]] = set()
     known: Known = {}
+    aside: tuple[Effect, ...] = ()
+    replaced: set[str] = set()
     while True:
-        grown, further, latest = _added(current, space, known)
+        grown, further, latest = _added(current, space, known, replaced)
         steps, trials = steps + further, trials | latest
-        if contest is not None and grown is current:
-            break
-        current, small = _large_enough(grown, space)
+        kept, small = _large_enough(grown, space)
         trials |= {key: replace(trials[key], why_not=why) for key, why in small.items()}
+        if contest is not None and grown is current:
+            if not small:
+                break
+            gone = {*aside, *grown.candidate.effects} - {*kept.candidate.effects}
+            replaced |= {effect.name for effect in gone}
+            current, contest = kept, None
+            continue
+        current = kept
         contest = contested(space.base, current, space.effects, space.prior, space.gates)
         weighed.add(frozenset(current.candidate.effects))
         better = contest.final
         if frozenset(better.candidate.effects) in weighed:
             break
         weighed.add(frozenset(better.candidate.effects))
+        aside = current.candidate.effects
         current, dropped = _pruned(better, space)
         contest = None if dropped else contest
     chosen = set(contest.final.candidate.effects)
@@ -66,16 +84,17 @@ def forward(space: SearchSpace) -> Choice:
 
 
 def _added(
-    current: Fit, space: SearchSpace, known: Known
+    current: Fit, space: SearchSpace, known: Known, replaced: Set[str] = frozenset()
 ) -> tuple[Fit, list[Fit], dict[tuple[str, str], Trial]]:
     """Add effects to a fit one by one; return the last fit, that after each addition, and the last trials.
 
     Effects that gained no more than chance does in the round before wait until no other may be added at once.
-    ``known``: trials that were made, to which those made here are added.
+    ``known``: trials that were made, to which those made here are added. ``replaced``: effects that may not
+    be added, since something too small to be claimed explains as much.
     """
     steps: list[Fit] = []
     trials: dict[tuple[str, str], Trial] = {}
-    barred: set[str] = set()
+    barred = set(replaced)
     while len(current.candidate.effects) < MOST_EFFECTS:
         effects = _open(current, barred, space)
         passed: list[Trial] = []
@@ -122,6 +141,7 @@ def _given_up(trial: Trial) -> bool:
 def _large_enough(current: Fit, space: SearchSpace) -> tuple[Fit, dict[tuple[str, str], Statement]]:
     """Drop effects that are not significant by their own intervals, or small beside what stays unexplained.
 
+    Also those that are too small to matter beside the others, whatever they were before these were there.
     The least significant goes first, then the smallest; it is said why of each. The intervals of few runs
     that a model misses by a fifth hold almost anything, since what is missed counts there as a dozen equal
     pieces: an effect stays that moves the prediction by more than all that the model misses and may get
@@ -137,7 +157,7 @@ def _large_enough(current: Fit, space: SearchSpace) -> tuple[Fit, dict[tuple[str
         why: Statement | None = Statement("holds_nothing", {"p_value": p_value})
         if p_value <= SIGNIFICANT or _exceeds_all_missed(evidences[least], current.noise.budget):
             least = min(evidences, key=lambda effect: evidences[effect].size)
-            why = small_beside_residual(evidences[least])
+            why = small_beside_residual(evidences[least]) or immaterial(evidences[least], space.least)
         if why is None:
             break
         dropped[least.key] = why

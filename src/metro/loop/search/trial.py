@@ -217,6 +217,11 @@ def _why_not(evidence: Evidence, q: float, gates: Gates, least: float) -> Statem
     if q > gates.false_additions:
         by_chance = q if evidence.p_value <= gates.false_additions else None
         return Statement("no_evidence", {"p_value": evidence.p_value, "q_value": by_chance})
+    return immaterial(evidence, least)
+
+
+def immaterial(evidence: Evidence, least: float) -> Statement | None:
+    """Return that an effect is smaller than what matters, or than errors of the inputs may be, if it is."""
     if evidence.size < least:
         return Statement("immaterial", {"size": evidence.size, "least": least})
     return None
